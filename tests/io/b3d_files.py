@@ -1,4 +1,4 @@
-"""Files of AddBiomechanics for tests, written from the format's description."""
+"""Files of AddBiomechanics for tests, written according to the description of the format."""
 
 from __future__ import annotations
 
@@ -32,7 +32,10 @@ def encode_bytes(number: int, content: bytes) -> bytes:
 
 
 def encode_message(values: Mapping[str, Any], schema: Schema) -> bytes:
-    """Encode values as Protocol Buffers does: fields in order, defaults left out, numbers packed."""
+    """Encode values as Protocol Buffers does.
+
+    Fields are in order, default values are omitted, and repeated numbers are packed.
+    """
     result = b""
     for number, (name, kind, repeated) in sorted(schema.items()):
         value = values.get(name, () if repeated else 0)
@@ -67,7 +70,10 @@ def encode_frame(values: Mapping[str, Any], names: Mapping[int, str]) -> bytes:
 
 
 def make_walker() -> osimlite.Model:
-    """A pelvis with two feet, whose arms are listed alternately, so that Nimble has another order."""
+    """Return a model of a pelvis with two legs.
+
+    The legs are listed alternately, so that Nimble has another order of coordinates.
+    """
     model = osimlite.Model(name="walker")
     inertia = (0.1, 0.1, 0.1, 0.0, 0.0, 0.0)
     ground = model.ground
@@ -118,11 +124,19 @@ def make_walker() -> osimlite.Model:
 NIMBLE_ORDER = (
     "tilt", "list", "turn", "tx", "ty", "tz", "hip_r_flexion", "mtp_r_angle", "hip_l_flexion", "mtp_l_angle",
 )  # fmt: skip
-"""Coordinates of the walker in the order of Nimble: one leg after the other, without the patella."""
+"""Coordinates of the walker in Nimble's order: one leg after the other, without the patella."""
 
 
 def make_arrays(frames: int, seed: int = 0) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return measurements and a pass with random numbers, and with physical forces."""
+    """Return random measurements, and a processing pass with plausible contact forces.
+
+    Args:
+        frames: number of frames.
+        seed: seed of the random numbers.
+
+    Returns:
+        Measured arrays and arrays of the pass, by name.
+    """
     rng = np.random.default_rng(seed)
     dofs = len(NIMBLE_ORDER)
     markers = rng.normal(size=(frames, 3 * len(MARKERS)))
@@ -152,7 +166,16 @@ def make_arrays(frames: int, seed: int = 0) -> tuple[dict[str, Any], dict[str, A
 
 
 def make_header(model_text: str, frames: Sequence[int], passes: Sequence[int]) -> dict[str, Any]:
-    """Return the header of a subject with trials of so many frames, and with these types of passes."""
+    """Return the header of a subject.
+
+    Args:
+        model_text: text of the model.
+        frames: number of frames of each trial.
+        passes: types of the processing passes.
+
+    Returns:
+        Values of the header by the names of its fields.
+    """
     sensors, processed = make_arrays(1)
     trials = [
         {
@@ -203,7 +226,13 @@ def encode_file(header: bytes, frames: bytes = b"") -> bytes:
 def make_subject(
     frames: Sequence[int] = (12, 7), passes: Sequence[int] = (0, 1), model_text: str | None = None
 ) -> bytes:
-    """Return the content of a file."""
+    """Return the content of a .b3d file.
+
+    Args:
+        frames: number of frames of each trial.
+        passes: types of the processing passes.
+        model_text: text of the model, None for that of `make_walker`.
+    """
     text = osimlite.to_text(make_walker()) if model_text is None else model_text
     body = b""
     for index, count in enumerate(frames):

@@ -1,4 +1,4 @@
-"""BVH files: what is written is read, other programs' files are read, and damage is described."""
+"""Check BVH files: a round trip, files of other programs, and messages about damage."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def test_joints_and_poses(tmp_path: Path) -> None:
     # A position channel replaces the offset of the joint.
     assert positions[0, 0].tolist() == [1.0, 2.0, 3.0]
     np.testing.assert_allclose(positions[0, 1], [1.0, -38.0, 3.0], atol=1e-12)
-    # Turned by 90 degrees about Z, -40 along Y is 40 along X.
+    # A rotation by 90 degrees about Z maps -40 along Y to 40 along X.
     np.testing.assert_allclose(positions[1, 1], [41.0, 2.0, 3.0], atol=1e-12)
     np.testing.assert_allclose(rotations[0, 0] @ [1.0, 0.0, 0.0], [0.0, 0.0, -1.0], atol=1e-12)
 
@@ -78,7 +78,8 @@ def test_what_is_written_is_read(tmp_path: Path) -> None:
 
 def test_end_sites_stand_anywhere_in_a_joint(tmp_path: Path) -> None:
     end = "End Site { OFFSET 0 0 7 }\n"
-    # Before and after the children of a joint, twice in one joint, and after those of the root.
+    # End sites stand before and after the children of a joint, twice in one joint, and after those
+    # of the root.
     text = TEXT.replace("  JOINT Spine", end + end.replace("7", "8") + "  JOINT Spine")
     text = text.replace("  }\n}\nMOTION", "  " + end + "  }\n" + end + "}\nMOTION")
     motion, plain = read_bvh(write(tmp_path, text)), read_bvh(write(tmp_path, TEXT))

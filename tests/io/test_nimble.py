@@ -1,4 +1,4 @@
-"""Nimble's reading of a model: which joints it makes, and the order of its degrees of freedom."""
+"""Check Nimble's interpretation of a model: its joints, and the order of its degrees of freedom."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def test_files_of_opensim_3_keep_the_order_of_their_bodies() -> None:
     )
     model = osimlite.read_text(text)
     assert [each.name for each in list_coordinates(model)] == [f"q_{name}" for name in tree]
-    # In the present format one leg follows the other.
+    # In the present format the second leg follows the first.
     again = osimlite.read_text(osimlite.to_text(model))
     legs = ["pelvis", "leg_r", "foot_r", "leg_l", "foot_l"]
     assert [each.name for each in list_coordinates(again)] == [f"q_{name}" for name in legs]

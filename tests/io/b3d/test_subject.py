@@ -1,4 +1,4 @@
-"""Subjects of AddBiomechanics: all numbers of a file, and clear errors for damaged ones."""
+"""Check reading of AddBiomechanics subjects: all numbers of a file, and clear errors for damaged files."""
 
 from __future__ import annotations
 
@@ -132,7 +132,7 @@ def test_passes_are_found_by_type_or_index(path: Path) -> None:
 
 
 def _change(**values: object) -> bytes:
-    """Return a file whose header has other values."""
+    """Return a file with other values in its header."""
     header = files.make_header(osimlite.to_text(files.make_walker()), (1,), (1,)) | values
     frame = files.make_subject((1,), (1,))
     size = header["sensor_frame_size"] + header["pass_frame_size"]
@@ -228,13 +228,13 @@ def test_importing_osimlite_does_not_load_the_reader() -> None:
 
 @pytest.mark.parametrize("seed", range(8))
 def test_changed_bytes_give_clear_errors_only(tmp_path: Path, seed: int) -> None:
-    """Change bytes and keep the size of the file, so that the frames are read too."""
+    """Change bytes but not the size of the file, so that the frames are read too."""
     rng = np.random.default_rng(seed)
     content = files.make_subject((4, 3))
     refused = 0
     for _ in range(25):
         changed = bytearray(content)
-        # The text of the models is most of the header, and harmless.
+        # Changes in the text of the models, which is most of the header, do no harm.
         start = rng.choice([8, len(content) - 10_000])
         for position in rng.integers(start, min(start + 10_000, len(content)), 3):
             changed[position] = rng.integers(256)

@@ -1,4 +1,4 @@
-"""Protocol Buffers: the few types of .b3d files, and clear errors for anything else."""
+"""Check decoding of the Protocol Buffers types in .b3d files, and clear errors for all other types."""
 
 from __future__ import annotations
 

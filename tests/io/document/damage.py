@@ -1,4 +1,4 @@
-"""Real model files damaged at random, in the ways files get damaged, and in ways meant to hurt."""
+"""Random damage to model files, as files get damaged by accident or with bad intent."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _WORD = re.compile(rb"(?<=>)[^<>\s]+")
 
 
 def damaged(data: bytes, random: Random) -> bytes:
-    """The bytes of a file with one to three damages."""
+    """Return a file with one to three random damages."""
     for _ in range(random.choice((1, 1, 2, 3))):
         data = random.choice(WAYS)(data, random)
     return data

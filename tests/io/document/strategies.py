@@ -1,4 +1,4 @@
-"""Hypothesis strategies: any object of any class, any model."""
+"""Hypothesis strategies for objects of any class and for models."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ CLASSES: list[type[Object]] = [
 ]
 
 numbers = st.floats(allow_nan=True, allow_infinity=True)
-# What XML can hold; OpenSim trims texts and takes runs of white space for one space.
+# Characters that XML can hold. OpenSim trims texts and collapses white space.
 texts = st.text(
     st.characters(exclude_categories=("Cs", "Cc", "Z"), exclude_characters="\ufffe\uffff"),
     max_size=8,
@@ -33,7 +33,7 @@ _SCALARS: dict[str, st.SearchStrategy[Any]] = {
 
 
 def values(kind: Value) -> st.SearchStrategy[Any]:
-    """Any value that a property of this kind takes and a text can hold."""
+    """Return a strategy for values that a property of this type accepts and a text can hold."""
     one = words if kind.scalar == "string" and kind.shape == "list" else _SCALARS[kind.scalar]
     if kind.shape == "single":
         return one
@@ -46,7 +46,7 @@ def values(kind: Value) -> st.SearchStrategy[Any]:
 
 @st.composite
 def objects(draw: st.DrawFn, accepts: type[Object] = Component, depth: int = 2) -> Object:
-    """An object that a property for `accepts` may hold, with some properties set and some not."""
+    """Draw an object that a property for `accepts` may hold, with some of its properties set."""
     kinds = [cls for cls in CLASSES if issubclass(cls, accepts)]
     cls = draw(st.sampled_from(kinds))
     given: dict[str, Any] = {"name": draw(names)}
@@ -64,8 +64,8 @@ def objects(draw: st.DrawFn, accepts: type[Object] = Component, depth: int = 2) 
             )
         elif isinstance(kind, Value):
             value = draw(values(kind))
-            # A file cannot say that a text is absent where it is there by default: an empty element
-            # is an empty text. OpenSim keeps the default of a vector whose element is empty.
+            # A file cannot say that a text is absent if the default is present: an empty element is
+            # an empty text. OpenSim keeps the default of a vector whose element is empty.
             is_absent_text = value is None and kind.scalar == "string" and spec.default is not None
             is_empty_vector = kind.shape == "vector" and not value and bool(spec.default)
             if not is_absent_text and not is_empty_vector:
@@ -77,8 +77,8 @@ def objects(draw: st.DrawFn, accepts: type[Object] = Component, depth: int = 2) 
                 given[spec.name] = ObjectList(draw(st.lists(held, max_size=2)))
             else:
                 item = draw(held)
-                # A property with a name gives it to its object; one without takes exactly its own
-                # class.
+                # The object of a named property has the property's name. An unnamed property holds
+                # exactly its own class.
                 if kind.form == "single":
                     item.name = spec.tag
                 if kind.form != "unnamed" or type(item) is spec.accepts:
@@ -88,7 +88,7 @@ def objects(draw: st.DrawFn, accepts: type[Object] = Component, depth: int = 2) 
 
 @st.composite
 def models(draw: st.DrawFn) -> Model:
-    """A model with a few components of any class."""
+    """Draw a model with a few components of any class."""
     model = Model(
         name=draw(names), credits=draw(texts), gravity=draw(st.tuples(numbers, numbers, numbers))
     )

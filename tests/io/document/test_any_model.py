@@ -1,4 +1,4 @@
-"""Any model that the schema can express is printed, read and equal, in every form."""
+"""Check that any model which the schema can express is equal after printing and reading, in every form."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Axes of a CustomJoint whose function, or whose direction, a file does not give."""
+"""Check axes of a CustomJoint whose function or direction is missing in the file."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from osimlite.schema.functions import LinearFunction
 
 
 def knuckle() -> str:
-    """A body that turns about X and Y, by two coordinates."""
+    """Return the text of a model whose body rotates about X and Y by two coordinates."""
     model = Model(name="m")
     body = model.add(
         Body(name="a", mass=1.0, mass_center=(0.1, 0.0, 0.0), inertia=(1, 1, 1, 0, 0, 0))
@@ -44,7 +44,7 @@ def first_axis(text: str, y: float):
 
 
 def test_axes_that_no_one_set_are_printed_where_the_class_has_another():
-    """OpenSim, too, takes X for an axis that is not in the file, whichever of the six it is."""
+    """OpenSim uses X for every axis that is missing in a file, so the default axes must be printed."""
     text = knuckle()
     assert "<axis>0 1 0</axis>" in text
     assert first_axis(text, 0.3) == pytest.approx((np.cos(0.3), 0.0, -np.sin(0.3)))
@@ -58,7 +58,7 @@ def test_an_empty_function_follows_its_coordinate_and_a_missing_one_does_not(
     text = without_function(instead, version)
     moved = (np.cos(0.3), 0.0, -np.sin(0.3)) if instead else (1.0, 0.0, 0.0)
     assert first_axis(text, 0.3) == pytest.approx(moved)
-    # What is written says the same to everybody.
+    # The printed text must have an explicit function, which every reader interprets equally.
     again = osimlite.to_text(osimlite.read_text(text))
     assert first_axis(again, 0.3) == pytest.approx(moved)
     assert ("LinearFunction" in again[again.index('name="rotation2"') :]) == bool(instead)

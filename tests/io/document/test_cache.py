@@ -1,4 +1,4 @@
-"""Documents that are kept while their files do not change."""
+"""Check that parsed documents are cached while their files do not change."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def file(tmp_path: Path) -> Path:
 
 
 def reads(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """The files that are read from now on."""
+    """Return a list that grows by the name of each file that is read from now on."""
     seen: list[str] = []
 
     def noted(source: Source, *, of: type[Object]) -> Document:
@@ -102,7 +102,7 @@ def test_a_file_is_the_same_by_every_path(tmp_path: Path, monkeypatch: pytest.Mo
     monkeypatch.chdir(tmp_path)
     assert known("one.txt") == known("./one.txt") == known(str(tmp_path / "one.txt")) == "one"
     assert seen == ["one.txt"] and known.has("./one.txt")
-    # From another folder the same words name another file.
+    # In another folder the same relative path names another file.
     (tmp_path / "inner").mkdir()
     (tmp_path / "inner" / "one.txt").write_text("another")
     monkeypatch.chdir(tmp_path / "inner")

@@ -1,4 +1,4 @@
-"""Whatever happens to a file: it is read, or refused in one sentence with a line."""
+"""Check that a damaged file is either read, or rejected with one sentence and a line."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from tests.conftest import ROOT, corpus_models
 from tests.io.document.damage import damaged
 
 LARGEST = 120_000
-"""Bytes of a file to damage; larger ones say nothing more and take longer."""
+"""Largest size (bytes) of files to be damaged; larger ones add time but no further cases."""
 
 
 def files() -> list[Path]:
-    """Small and old documents of ours, and real files where they are at hand."""
+    """Return small and old fixtures, and corpus files if they are available."""
     ours = [
         path
         for name in ("versions", "walker", "documents")
@@ -33,7 +33,10 @@ def files() -> list[Path]:
 
 
 def fate(data: bytes) -> str:
-    """What becomes of a file: ``read``, or ``refused``. Anything but that raises."""
+    """Read a damaged file and return ``read`` or ``refused``.
+
+    The test fails if any other exception is raised.
+    """
     try:
         document = read_document(Source(data, "damaged.osim"), expected_class=Object)
     except DocumentError as refused:
@@ -41,8 +44,8 @@ def fate(data: bytes) -> str:
         assert refused.message and "\n" not in refused.message, refused.message
         return "refused"
     top = document.top
-    # What has been read can be walked, asked and written, and what is written is read again without
-    # a change.
+    # A document that was read must allow access and printing, and its print must be read again
+    # without a change.
     if isinstance(top, Model):
         tree = top.tree()
         for use in tree.uses():

@@ -1,4 +1,4 @@
-"""Models as YAML and JSON: nothing is lost on the way, and what is wrong is told with its place."""
+"""Check models as YAML and JSON: nothing is lost, and errors have their position."""
 
 from __future__ import annotations
 

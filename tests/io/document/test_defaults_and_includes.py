@@ -1,4 +1,7 @@
-"""``<defaults>`` blocks and ``file`` attributes: read per document, never leaking, written back."""
+"""Check ``<defaults>`` blocks and ``file`` attributes.
+
+They apply to one document only, and are written again.
+"""
 
 from __future__ import annotations
 
@@ -83,7 +86,7 @@ def bodies(model: Model) -> list[Body]:
 def test_objects_take_what_their_class_has_in_the_block_as_opensim_does() -> None:
     model = osimlite.read_text(BODIES)
     assert [body.mass for body in bodies(model)] == [7.0, 7.0]
-    # An Appearance in the file starts from the block; one that its owner made itself does not.
+    # An Appearance in the file starts from the defaults; one that its owner creates does not.
     assert [geometry.appearance.opacity for geometry in bodies(model)[1].attached_geometry] == [
         0.25,
         1.0,
@@ -162,7 +165,7 @@ def test_an_object_may_stand_in_a_file_of_its_own(folder: Path) -> None:
     document = read_document(Source.from_file(folder / "model.osim"))
     assert marker(document.model).location == (1.0, 2.0, 3.0)
     assert marker(document.model).path == "/markerset/mk"
-    # What is wrong in the other file is told at the place that names it.
+    # Problems in the included file are reported at the element that names the file.
     assert [(note.kind, document.source.spans[note.number].tag) for note in document.notes] == [
         ("include", "MarkerSet"),
         ("unknown-tag", "MarkerSet"),
@@ -263,7 +266,7 @@ def test_what_only_looks_like_an_attribute(folder: Path) -> None:
 
 
 def test_what_another_system_would_include_is_not_included(folder: Path) -> None:
-    """XInclude is none of OpenSim's."""
+    """OpenSim does not support XInclude."""
     other = '<xi:include xmlns:xi="http://www.w3.org/2001/XInclude" href="markers.xml" />'
     text = INCLUDING.replace('<MarkerSet file="markers.xml" />', other)
     document = read_document(Source(text.encode(), str(folder / "model.osim")))

@@ -1,4 +1,4 @@
-"""Documents that are no models: read as typed objects, printed as OpenSim prints them, nothing of them lost."""
+"""Check documents that are not models: typed objects, OpenSim's print, and no loss of content."""
 
 from __future__ import annotations
 

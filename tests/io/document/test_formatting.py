@@ -1,4 +1,4 @@
-"""One layout for documents of every version; what they say stays as it is."""
+"""Check formatting of documents of every version: one layout, with unchanged content."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ DOCUMENT = '<OpenSimDocument Version="{}"><Model name="m">{}</Model></OpenSimDoc
 
 
 def laid_out(inner: str, version: int = 30000) -> str:
-    """The lines between the tags of the model."""
+    """Return the formatted lines between the tags of the model."""
     text = format_document(Source(DOCUMENT.format(version, inner).encode()))
     assert format_document(Source(text.encode())) == text
     assert f'<OpenSimDocument Version="{version}">\n\t<Model name="m">' in text

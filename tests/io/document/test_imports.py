@@ -1,4 +1,7 @@
-"""Reading imports what the file needs and no more: start-up is most of the time of a short command."""
+"""Check that reading imports only the modules that a file needs.
+
+Start-up takes most of the time of a short command.
+"""
 
 from __future__ import annotations
 
@@ -27,8 +30,7 @@ def loaded(fixtures: Path) -> set[str]:
 
 def test_areas_whose_tags_do_not_occur_stay_out(loaded: set[str]) -> None:
     areas = {name.rpartition(".")[2] for name in loaded if name.startswith("osimlite.schema.")}
-    # The walker has bodies, joints, contact, forces and no muscle, path, probe or controller of its
-    # own.
+    # The walker has bodies, joints, contact and forces, but no muscle, path, probe or controller.
     assert not areas & {
         "actuators", "constraint_types", "contact_forces", "controller_types", "custom_joint", "metabolics", "muscles",
         "muscle_curves", "path_actuators", "path_forces", "paths", "prescribed", "probe_types", "reporters", "springs",
@@ -83,7 +85,7 @@ def test_what_a_short_command_leaves_out(
     )
     code = "import sys, osimlite.cli as c\ntry: c.main(sys.argv[1:])\nfinally: print(*sys.modules, file=sys.stderr)"
     for _ in range(2):
-        # The second time, the file is found unchanged.
+        # The second run finds the file unchanged in the cache.
         done = subprocess.run(
             [sys.executable, "-c", code, *words], cwd=tmp_path, capture_output=True, text=True, check=False,
             env={**os.environ, "XDG_CACHE_HOME": str(tmp_path / "cache")},

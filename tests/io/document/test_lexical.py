@@ -1,4 +1,4 @@
-"""The lexical rules of xml_format.md: what OpenSim 4.6 reads from a text."""
+"""Check the lexical rules of xml_format.md: which values OpenSim 4.6 reads from a text."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def test_white_space_of_any_kind_separates() -> None:
 
 
 def test_only_ascii_counts_as_digits_and_white_space() -> None:
-    # A no-break space and full-width digits come from word processors; OpenSim keeps the default.
+    # Word processors insert no-break spaces and full-width digits; OpenSim keeps the default value.
     for raw in ("0\u00a0-5 0", "0 -\uff15 0", "\u200b0 -5 0", "0 \u22125 0"):
         with pytest.raises(UncleanText) as caught:
             make_converter(VEC3)(raw)

@@ -1,4 +1,4 @@
-"""Colons in names, and namespaces: letters and attributes like others for OpenSim."""
+"""Check colons in names and namespaces, which OpenSim treats as ordinary letters and attributes."""
 
 from __future__ import annotations
 

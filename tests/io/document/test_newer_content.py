@@ -1,4 +1,4 @@
-"""Documents whose content is newer than the version that they state."""
+"""Check documents whose content is newer than the version that they state."""
 
 from __future__ import annotations
 

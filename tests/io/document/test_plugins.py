@@ -1,4 +1,4 @@
-"""Classes of plug-ins: declared in a file, they are classes like any others."""
+"""Check classes of plug-ins, which are declared in a file and treated like OpenSim's classes."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ PATCH = """		<components>
 
 @pytest.fixture
 def folder(fixtures, tmp_path, monkeypatch):
-    """A folder with the classes of the manual and a model that has objects of them."""
+    """Return a folder with the classes of the manual and a model that has objects of them."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     Path("classes.json").write_text(CLASSES[0])
@@ -72,7 +72,7 @@ def test_without_the_file_they_are_unknown_and_with_it_objects(folder):
     )
     (patch,) = model.subcomponents
     assert patch.path == "/patch" and patch.normal == (0, 0, 1) and patch.pressure.amplitude == 2
-    # What counted for one file counts for no other.
+    # Declarations for one file do not apply to other files.
     assert not get_plugin_classes() and find_class("BodyDragForce") is None
     assert isinstance(osimlite.read("m.osim").force_set.objects[-1], Unknown)
 
@@ -270,7 +270,7 @@ def test_an_output_of_a_plugin_is_one(folder):
 
 
 def test_a_class_may_derive_from_any(folder):
-    """Of every class another is derived; an object of it, wrong in two ways, is checked by all rules."""
+    """Classes derived from every class work: all rules check an object with two faults."""
     names = sorted(set(MODULES) - {"Model", "Object", "Unknown"})[:: choose(4, 1)]
     more = {
         "properties": [

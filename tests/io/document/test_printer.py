@@ -1,4 +1,4 @@
-"""Model to text."""
+"""Check printing of models as XML text."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Text to model, and what the reader notices."""
+"""Check reading of models from XML text, and the reader's notes."""
 
 from __future__ import annotations
 
@@ -97,7 +97,8 @@ def test_unknown_classes_in_a_set_keep_their_place_and_name() -> None:
 
 
 def test_a_property_of_an_unknown_class_is_refused_by_class_and_name(fixtures: Path) -> None:
-    # A coordinate stands where code expects one, so that no earlier check refuses it.
+    # The misspelt element stands where code expects a coordinate, so that no earlier check rejects
+    # it.
     text = (fixtures / "lint" / "skeleton.osim").read_text(encoding="utf-8")
     wrong = text.replace("<Coordinate name", "<Cordinate name").replace(
         "</Coordinate>", "</Cordinate>"
@@ -195,7 +196,7 @@ def test_what_is_no_document_is_refused_with_its_place(text: str, line: int, wor
     ],
 )  # fmt: skip
 def test_a_version_is_read_as_opensim_reads_it(text: str, version: int | None) -> None:
-    """Each was tried with OpenSim 4.6."""
+    """The expected versions were verified with OpenSim 4.6."""
     document = f'<OpenSimDocument Version="{text}"><Model/></OpenSimDocument>'
     if version is not None:
         assert read_document(Source(document.encode())).version == version
@@ -248,7 +249,7 @@ def test_parts_of_a_text_belong_to_its_model_or_to_none() -> None:
     bodies = '<BodySet><objects><Body name="b"/></objects></BodySet>'
     text = f'<OpenSimDocument Version="40600"><Model name="m">{bodies}</Model></OpenSimDocument>'
     model = osimlite.read_text(text)
-    # The first question: there is no tree of components that could answer it.
+    # `model` must work as the first access, before a component tree exists.
     assert model.body_set.objects[0].model is model
     alone = Source(f'<OpenSimDocument Version="40600">{bodies}</OpenSimDocument>'.encode())
     body_set = read_document(alone, expected_class=BodySet).top
@@ -256,7 +257,7 @@ def test_parts_of_a_text_belong_to_its_model_or_to_none() -> None:
 
 
 def test_an_optional_number_may_be_empty_and_an_optional_text_is_then_empty() -> None:
-    """Checked with OpenSim 4.6: the number has no value, the text has an empty one."""
+    """Verified with OpenSim 4.6: the number has no value, the text has an empty one."""
     text = (
         '<OpenSimDocument Version="40600"><Model name="m"><ForceSet><objects>'
         '<ExpressionBasedBushingForce name="b"><moment_visual_scale> </moment_visual_scale>'

@@ -1,4 +1,7 @@
-"""Text that is not quite XML: read where its meaning is certain, with a note; else refused, with line and column."""
+"""Check text that is almost XML.
+
+It is read with a note where its meaning is certain; otherwise it is rejected with line and column.
+"""
 
 from __future__ import annotations
 
@@ -64,13 +67,13 @@ def test_read_with_a_note(old: str, new: str, kind: str, line: int) -> None:
     assert result.fault is not None
     thigh = result.model["/bodyset/thigh"]
     assert thigh.mass == 8
-    # Positions are those of the text as it is.
+    # Positions refer to the original text, not to the repaired one.
     source = result.source
     assert source.lines[source.locate_tag(thigh.source_index).line - 1].startswith("<Body")
     mass = source.child(thigh.source_index, "mass")
     assert mass is not None
     assert source.lines[source.locate_tag(mass).line - 1].endswith("<mass>8</mass>")
-    # What is written is XML.
+    # The printed text is valid XML.
     assert not [
         note
         for note in read_document(Source(to_text(result.model).encode())).notes

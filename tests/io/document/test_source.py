@@ -1,4 +1,4 @@
-"""Line and column of every element."""
+"""Check line and column of every element."""
 
 from __future__ import annotations
 

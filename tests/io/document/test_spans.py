@@ -1,4 +1,4 @@
-"""Where elements stand: the quick ways agree with reading the text tag by tag."""
+"""Compare the fast computation of element positions with reading the text tag by tag."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Syntax errors in plain words, each at the character that is wrong."""
+"""Check messages of syntax errors in plain words, each at the wrong character."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Escaping equals the standard library's."""
+"""Compare escaping of text with the standard library's."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where mesh files are looked for, and where they must not come from."""
+"""Check in which folders mesh files are searched, and from which they must not be read."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from osimlite.io.meshes.folders import MeshFolders, OutsideError
 
 @pytest.fixture
 def model(tmp_path: Path) -> Path:
-    """The folder of a model, with a private mesh beside it."""
+    """Return the folder of a model, with a private mesh in a neighbouring folder."""
     (tmp_path / "model").mkdir()
     (tmp_path / "private").mkdir()
     (tmp_path / "private" / "bone.obj").write_text("v 0 0 0")

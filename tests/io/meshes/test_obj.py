@@ -1,4 +1,4 @@
-"""Wavefront OBJ files: what is read of them, and what they are written anew from."""
+"""Check reading and rewriting of Wavefront OBJ files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Surfaces in VTK's XML format: as VTK writes them, as we write them here, and damaged."""
+"""Check surfaces in VTK's XML format: files written by VTK, by these tests, and damaged ones."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def volume(surface: Surface) -> float:
 def test_what_vtk_writes_is_read(fixtures, encoding):
     surface = read_vtp((fixtures / "meshes" / f"{encoding}.vtp").read_bytes(), "x.vtp")
     assert len(surface.points) == 54
-    # Area and volume are those that VTK computes.
+    # Area and volume were computed by VTK.
     assert area(surface) == pytest.approx(7.090658003369256, rel=1e-12)
     assert volume(surface) == pytest.approx(1.062036759256733, rel=1e-12)
     same = read_vtp((fixtures / "meshes" / "binary.vtp").read_bytes(), "x.vtp")
@@ -68,14 +68,14 @@ def test_a_compression_that_is_not_known_is_named(fixtures):
 
 # ------------------------------------------------------------------------------------- what the format allows
 class Writer:
-    """Writes arrays by the description of the format."""
+    """Writer of arrays according to the description of the format."""
 
     def __init__(self, form: str, compressor: str, header: str, order: str) -> None:
         self.form, self.compressor, self.header, self.order = form, compressor, header, order
         self.appended = b""
 
     def block(self, data: bytes) -> list[bytes]:
-        """The parts that base64 encodes one by one."""
+        """Return the parts that base64 encodes separately: the header and the compressed blocks."""
         pack = np.dtype(
             ("<" if self.order == "LittleEndian" else ">")
             + {"UInt32": "u4", "UInt64": "u8"}[self.header]
@@ -208,7 +208,7 @@ def test_what_is_wrong_is_said(content, said):
 # --------------------------------------------------------------------------------------------------- polygons
 @given(st.lists(st.floats(0.2, 3.0), min_size=3, max_size=12), st.floats(0.0, 6.0), st.booleans())
 def test_polygons_that_are_not_convex_are_covered_once(radii, tilt, turned):
-    """A star-shaped polygon of any shape in any plane: its triangles have its area and turn as it does."""
+    """Triangles of a star-shaped polygon in any plane have its area and its orientation."""
     angles = np.linspace(0.0, 2.0 * np.pi, len(radii), endpoint=False)
     flat = np.array([np.cos(angles), np.sin(angles)]).T * np.array(radii)[:, None]
     flat = flat[::-1] if turned else flat

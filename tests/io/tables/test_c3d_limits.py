@@ -1,4 +1,4 @@
-"""The process that reads a .c3d file has limits, and tells a reason in place of a traceback."""
+"""Check that the process which reads .c3d files has limits, and reports a reason instead of a traceback."""
 
 from __future__ import annotations
 
@@ -31,7 +31,12 @@ c3d_process.run_process()
 
 
 def run(time: str, lowest: str = "") -> subprocess.CompletedProcess[bytes]:
-    """Run the process with a reader that returns its limits, and a limit that the system has set."""
+    """Run the process with a reader that returns its limits.
+
+    Args:
+        time: limit of processor time (s) that is requested.
+        lowest: limit of processor time (s) of the system, empty for none.
+    """
     command = [sys.executable, "-c", PROGRAM, "markers", time, "120", lowest]
     return subprocess.run(command, capture_output=True, check=False, timeout=200)
 

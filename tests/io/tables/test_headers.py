@@ -1,4 +1,4 @@
-"""Headers of tables: what is read of them, where it is, and how long that takes."""
+"""Check headers of tables: their content, its positions, and the time of reading."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def test_what_a_marker_file_says():
 
 @pytest.mark.parametrize("part", [b" ", b"\t", b"\n", b"a", b"a ", b"a\t", b"=", b"\r", b"\xff"])
 def test_long_headers_are_read_in_time_that_grows_with_them(part):
-    """A pattern that tries every beginning again would not come to an end."""
+    """A pattern that backtracks from every beginning would not finish."""
     long = part * choose(50_000, 300_000)
     for start in (b"", b"a=b", b"t\nendheader\n", b"t\nendheader\ntime\t"):
         StorageHeader(start + long + b"x\n")

@@ -1,4 +1,4 @@
-"""Tables as OpenSim's tools print them."""
+"""Check tables in the format that OpenSim's tools print."""
 
 from __future__ import annotations
 

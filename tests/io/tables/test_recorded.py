@@ -26,7 +26,7 @@ from osimlite.simulation.recorded_motion import RecordedMotion, exclude_forces
 
 @pytest.fixture(scope="module")
 def arm() -> Mechanism:
-    """A body on a ball joint, a second on a pin."""
+    """Return the mechanism of a body on a ball joint and a second one on a pin."""
     model = Model(name="arm")
     inner, outer = (
         model.add(

@@ -1,4 +1,4 @@
-"""Results say what they are in a short table."""
+"""Check that results print a short table as their representation."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def test_results_have_short_texts(make):
 
 
 def make_motion():
-    """Arguments of a motion along the platform."""
+    """Return the arguments `motion` and `times` of a motion along the platform."""
     times = np.linspace(0.0, 0.2, 11)
     return {"motion": {"Pelvis_tx": times}, "times": times}
 

@@ -1,4 +1,4 @@
-"""Reading and writing storage files."""
+"""Check reading and writing of storage files."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ FINITE = st.floats(allow_nan=False, allow_infinity=False)
 
 
 def test_layout():
-    """Line for line what OpenSim 4.6 writes, but for its own version."""
+    """The lines are those of OpenSim 4.6, except for the line of its version."""
     assert format_sto(
         "Walker", [0.0, 0.5], ["/a/value", "/a/speed"], [[1.0, -0.0], [1e-21, 2.5]]
     ).splitlines() == [
@@ -121,7 +121,8 @@ def test_what_older_programs_wrote(tmp_path):
     head = "name walk\ndatacolumns 3\ndatarows 2\nrange 0 1\nendheader\n"
     path.write_text(f"{head}time hip\tknee\n0 1.#QNAN 2\n1 -1.#INF -nan\n\n")
     table = read_sto(path)
-    # Files of SIMM are in degrees; the number of columns tells that both tabs and spaces part them.
+    # SIMM files are in degrees. The number of columns shows that tabs and spaces both separate
+    # them.
     assert (table.name, table.columns, table.in_degrees) == ("walk", ("hip", "knee"), True)
     assert np.isnan(table.rows[0, 0]) and table.rows[1, 0] == -np.inf and np.isnan(table.rows[1, 1])
     for said, degrees in (
@@ -146,7 +147,7 @@ def test_labels_with_spaces(tmp_path):
 
 
 def test_rows_one_by_one(tmp_path):
-    """A file is neither read nor written as a whole."""
+    """Rows are written and read one by one, without the complete file in memory."""
     path, asked = tmp_path / "long.sto", []
 
     def rows():

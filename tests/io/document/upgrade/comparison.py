@@ -1,4 +1,4 @@
-"""Two models side by side, ours and OpenSim's: what is equal, and where OpenSim differs for a reason of its own."""
+"""Compare an upgraded model with OpenSim's, except for differences that OpenSim itself causes."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from osimlite.schema.specs import FieldSpec
 from osimlite.schema.tree import Tree, Use
 
 SIX_DIGITS = 1e-5
-"""What is left of a number after OpenSim has printed it with six digits."""
+"""Relative accuracy of a number that OpenSim has printed with six digits."""
 
 ROUNDED = {
     ("Body", "inertia"),
@@ -21,11 +21,14 @@ ROUNDED = {
     ("PhysicalOffsetFrame", "translation"),
     ("PhysicalOffsetFrame", "orientation"),
 }
-"""Properties that OpenSim's upgrade writes with six digits; so does its printer with the arrays of functions."""
+"""Properties that OpenSim's upgrade writes with six digits.
+
+OpenSim's printer does the same with the arrays of functions.
+"""
 
 
 def differences(ours: Model, theirs: Model) -> list[str]:
-    """Every property in which the two differ, where OpenSim has no reason of its own to."""
+    """Return a description of every property in which the models differ, except for OpenSim's own reasons."""
     tree, other_tree = ours.tree(), theirs.tree()
     return [
         f"{mine.tag} {mine.name}.{spec.name}: {getattr(mine, spec.name)!r} is {getattr(other, spec.name)!r} to OpenSim"
@@ -35,7 +38,10 @@ def differences(ours: Model, theirs: Model) -> list[str]:
 
 
 def properties(ours: Object, theirs: Object) -> Iterator[tuple[Object, Object, FieldSpec]]:
-    """Every property of two objects and of what they hold, side by side; classes and numbers of objects are equal."""
+    """Yield every property of two objects and of their parts, in pairs.
+
+    Classes and numbers of objects must be equal.
+    """
     assert type(ours) is type(theirs), f"{ours!r} is {theirs!r} to OpenSim"
     for spec in type(ours).field_specs().values():
         if not isinstance(spec.kind, ObjectField):
@@ -57,7 +63,7 @@ def held(item: Object, spec: FieldSpec) -> list[Object]:
 def equal(mine: Object, other: Object, spec: FieldSpec, ours: Tree, theirs: Tree) -> bool:
     left, right = getattr(mine, spec.name), getattr(other, spec.name)
     if isinstance(spec.kind, Reference) and spec.name.startswith("socket_") and left != right:
-        # OpenSim writes every path in one spelling; what counts is where it leads.
+        # OpenSim writes all paths in one form, therefore compare the components to which they lead.
         return led(mine, spec, ours) == led(other, spec, theirs)
     rounded = (type(mine).__name__, spec.name) in ROUNDED or (
         spec.legacy and isinstance(left, tuple)
@@ -82,21 +88,21 @@ def same(left: Any, right: Any, tolerance: float) -> bool:
 
 
 def excepted(mine: Object, other: Object, spec: FieldSpec, model: Model) -> bool:
-    """Whether OpenSim differs for a reason of its own, which is the same for files of the current version."""
+    """Return whether OpenSim differs for its own reason, which applies to files of the current version too."""
     left, right = getattr(mine, spec.name), getattr(other, spec.name)
     match type(mine).__name__, spec.name:
         case "FrameGeometry" | "Sphere", "socket_frame":
-            # Connecting sets it for the geometry of a frame, whatever the file says.
+            # OpenSim sets it when it connects the geometry of a frame, whatever the file says.
             return (left, right) == ("", "..")
         case "WrapTorus" | "WrapCylinder" | "WrapSphere" | "WrapEllipsoid", "quadrant":
-            # OpenSim writes out what the default stands for.
+            # OpenSim writes the value for which the default stands.
             return (left, right) == ("Unassigned", "all")
         case "ActiveForceLengthCurve", "minimum_value":
-            # An equilibrium muscle with damping sets its own curve's floor.
+            # An equilibrium muscle with damping sets the minimum of its curve itself.
             return (left, right) == (0.1, 0.0)
         case "Appearance", "color":
-            # OpenSim paints every ligament green, whatever colour the file gives it; we keep the
-            # file's.
+            # OpenSim paints every ligament green, whatever colour the file has; osimlite keeps the
+            # file's colour.
             paths = [
                 force.geometry_path
                 for force in model.components()
@@ -104,10 +110,10 @@ def excepted(mine: Object, other: Object, spec: FieldSpec, model: Model) -> bool
             ]
             return right == (0.0, 1.0, 0.0) and any(mine is path.appearance for path in paths)
         case "PointActuator", "force_is_global":
-            # OpenSim turns it on for a file from before 10905, and leaves it out when it prints.
+            # OpenSim sets it to true for a file before version 10905, and omits it when it prints.
             return (left, right) == (True, False) and model.document_version < 10905
         case "ObjectGroup", "members":
-            # OpenSim drops, without a word, members that the set does not have.
+            # OpenSim drops members that the set does not have, without a message.
             names = {force.name for force in model.force_set.objects}
             return right == tuple(name for name in left if name in names)
     return False

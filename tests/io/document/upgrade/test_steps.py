@@ -1,4 +1,7 @@
-"""Every step of the upgrade, each on a small document that needs it; and what OpenSim does wrong is not done here."""
+"""Check every step of the upgrade on a small document that needs it.
+
+OpenSim's errors in these steps are not repeated.
+"""
 
 from __future__ import annotations
 
