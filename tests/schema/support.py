@@ -1,4 +1,4 @@
-"""Models, data and comparisons that several test modules of this package share."""
+"""Data that several test modules of this folder share."""
 
 from __future__ import annotations
 
@@ -9,4 +9,4 @@ UNREGISTERED = {
     "MocoStepTimeAsymmetryGoalGroup",
     "Set_FunctionBasedPath_",
 }
-"""What OpenSim writes, or reads where it knows beforehand what it will be, and finds by no tag."""
+"""Classes that OpenSim writes, or reads where their type is known, but does not find by their tag."""

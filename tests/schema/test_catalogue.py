@@ -1,4 +1,7 @@
-"""Every component class against the catalogue of OpenSim 4.6: properties, order, types, defaults, references."""
+"""Compare every component class with the catalogue of OpenSim 4.6.
+
+The comparison covers properties, their order, types and defaults, and references.
+"""
 
 from __future__ import annotations
 
@@ -27,23 +30,23 @@ CONCRETE = sorted(
     for name, entry in CATALOGUE.items()
     if entry.get("registered") and not entry["abstract"] and name != "SimbodyEngine"
 )
-"""The classes that a document may hold; of SimbodyEngine nothing is left but its name."""
+"""Classes that a document may hold, except for SimbodyEngine, of which OpenSim supports only the name."""
 
 
 NOT_IN_FILES = {"PathWrapPoint"}
-"""Concrete in OpenSim's C++ but never written to a file: declared as internal parts, without a tag."""
+"""Classes that are concrete in OpenSim's C++ but never written to a file: internal parts without a tag."""
 
 WITHOUT_TEXT = {"point-index", "positional"}
-"""Rules of references that are numbers or owned objects: the property is no text that names something."""
+"""Rules of references whose values are numbers or owned objects instead of names."""
 
 NO_COMPONENT = {"property of that component"}
-"""What is named and is no component, file or column."""
+"""Targets of references that are not components, files or columns."""
 
 OUTSIDE_46 = {"@file", "actuator_list"}
-"""An attribute every object may have, and a property that versions before 40600 had."""
+"""Properties outside the catalogue: an attribute of every object, and a property before version 40600."""
 
 OUTSIDE_TARGETS = {"file": "file", "column": "column"}
-"""What else lies outside the model has one target per rule; the catalogue describes it in prose."""
+"""Target of each rule that leads out of the model; the catalogue describes it in prose."""
 
 TARGETS = {
     "SimTK::Vector_<double>": "Vector",
@@ -56,14 +59,14 @@ TARGETS = {
     ".sto/.mot file": "table file",
     ".sto or ControlSet .xml": "ControlSet or table file",
 }
-"""What the catalogue describes in prose."""
+"""Classes for targets that the catalogue describes in prose."""
 
 FILES = re.compile(r"\w+_files?|filepath|\w+_(directory|folder)|orientation_file_for_calibration")
 """Names of properties of tools that are paths of files and folders."""
 
 
 def declared(tag: str) -> Any:
-    """The class of an XML element; it must be there."""
+    """Return the class of an XML element; fail if the class does not exist."""
     cls = find_class(tag)
     assert cls is not None, f"no class for <{tag}>"
     return cls
@@ -80,7 +83,11 @@ REFERENCE_OF = references()
 
 
 def expected_reference(prop: dict) -> tuple[str, str, bool, bool] | None:
-    """Rule, target, required and list of a property that is a reference, else None."""
+    """Return what the catalogue says about a reference, or None for other properties.
+
+    Returns:
+        The rule, the target, whether the reference is required, and whether it is a list.
+    """
     entry = REFERENCE_OF.get((prop["declared_in"], prop["name"]))
     if entry is None or entry["resolution"] in WITHOUT_TEXT or entry["target"] in NO_COMPONENT:
         return None
@@ -91,7 +98,10 @@ def expected_reference(prop: dict) -> tuple[str, str, bool, bool] | None:
 
 
 def tag_of(prop: dict) -> str:
-    """The tag in a file: of the one object of a property of the first system it is that of its class."""
+    """Return the tag of a property in a file.
+
+    An unnamed property with one object has the tag of its class.
+    """
     return prop["accepts_base"] if "printed_as" in prop else prop["name"]
 
 
@@ -100,7 +110,7 @@ def expected_default(prop: dict) -> str | None:
 
 
 def printed(kind: Any, value: Any) -> str:
-    # of these OpenSim prints six digits
+    # OpenSim prints six digits of these properties.
     if kind.legacy and kind.shape == "list" and kind.scalar == "double":
         return " ".join(f"{number:g}" for number in value)
     text = make_formatter(kind, "opensim")(value)
@@ -108,7 +118,7 @@ def printed(kind: Any, value: Any) -> str:
 
 
 def same_default_object(made: Object, wanted: dict, where: str) -> None:
-    """Compare a default object with the catalogue: its class, its name, and what differs from its class's defaults."""
+    """Compare a default object with the catalogue: class, name, and differences from the class's defaults."""
     assert type(made).tag == wanted["class"], where
     assert made.name == wanted.get("name", ""), where
     assert not made.model_fields_set, (
@@ -129,7 +139,7 @@ def same_default_object(made: Object, wanted: dict, where: str) -> None:
             assert value == getattr(plain, spec.name), f"{where}/{spec.tag}"
         else:
             assert repr(value) == repr(getattr(plain, spec.name)), f"{where}/{spec.tag}"
-    # Of a model that is a default, OpenSim has finished the ground already.
+    # OpenSim has completed the ground of a model that is a default object already.
     assert overrides.keys() - {"Ground"} <= get_field_specs(type(made)).keys()
 
 
@@ -243,7 +253,7 @@ def test_internal_parts_are_opensims(name: str) -> None:
 
 
 def test_no_reference_is_forgotten() -> None:
-    """Every text that names something, by the class that declares it, is covered by the test of its class."""
+    """Every reference in the catalogue belongs to a class whose test covers it."""
     reached = set()
     for name in CONCRETE:
         for prop in CATALOGUE[name]["properties"]:
@@ -264,7 +274,7 @@ def test_no_reference_is_forgotten() -> None:
 
 
 def test_the_registry_knows_exactly_the_classes_of_model_documents() -> None:
-    """And, besides, those that say that OpenSim has them only later."""
+    """Besides the catalogue there are only classes that are declared to be newer than OpenSim 4.6."""
     known = [tag for tag in list_tags() if not declared(tag).since]
     assert known == sorted({*(CATALOGUE[name]["xml_tag"] for name in CONCRETE), *UNREGISTERED})
     assert len(known) == 301
@@ -274,7 +284,7 @@ def test_the_registry_knows_exactly_the_classes_of_model_documents() -> None:
 
 
 def test_bases_without_a_file_form_are_opensims_too() -> None:
-    """What is declared and has no tag in files is an abstract base of OpenSim, or said here why not."""
+    """Declared classes without a tag in files are abstract in OpenSim, or are exceptions listed here."""
     root_and_unknown = {"Object", "Unknown"}
     templates = {"Set", "ModelComponentSet", "TwoFrameLinker", "TableSource"}
     templates |= {"NumberReporter", "Vec3Reporter", "VectorReporter"}
@@ -303,6 +313,6 @@ def test_words_besides_names_and_the_fate_of_a_missing_name(entry: dict) -> None
         else get_field_specs(cls)[entry["property"]].kind
     )
     if isinstance(kind, Reference):
-        # Of tasks without a body the catalogue does not speak.
+        # The catalogue does not mention tasks without a body, which have the wildcard -1.
         assert set(kind.words) - {"-1"} == {words.split()[0] for words in entry["wildcards"]}
         assert (kind.consequence == "refused") is entry["on_missing"].startswith("throws")

@@ -1,4 +1,4 @@
-"""The index of a model is made anew when the model has changed, by whatever way, and only then."""
+"""Check that the index of a model is rebuilt after any change of the model, and only then."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from osimlite.models.dynamic_walker import dynamic_walker
 
 
 def carrying():
-    """A model with a body on a pin, and a spring."""
+    """Return a model with a body on a pin, and a spring."""
     model = Model(name="m")
     body = model.add(Body(name="b", mass=1.0))
     model.add(PinJoint(name="j", coordinates=[Coordinate(name="q")]).between(model.ground, body))

@@ -1,4 +1,7 @@
-"""Every class: the reader's short way in equals validated construction; copies, pickles and misspellings."""
+"""Check construction of every class: the reader's fast path equals validated construction.
+
+The tests also cover copies, pickles and misspelt names.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +31,7 @@ every_class = of_each(CLASSES.values(), lambda cls: cls.__name__)
 
 
 def filled(cls: type[Object]) -> Object:
-    """An instance with another value than the default in every property."""
+    """Return an instance in which every property differs from its default."""
     values: dict[str, object] = {"name": "filled"}
     for spec in get_field_specs(cls).values():
         kind = spec.kind
@@ -136,7 +139,7 @@ def test_every_property_can_be_given_by_its_tag(cls: type[Object]) -> None:
 
 
 def test_no_validator_is_built_for_values_that_are_right() -> None:
-    """To build pydantic's validator of a class takes milliseconds, and all its plug-ins are looked for."""
+    """Building pydantic's validator of a class takes milliseconds, and searches all its plug-ins."""
 
     class Lamp(Object):
         watts: Number = 40.0
@@ -208,7 +211,7 @@ def test_a_socket_is_known_by_the_middle_of_its_name(cls, given, meant):
 
 
 def test_nearest_names_are_looked_for_only_if_the_message_is_read(monkeypatch):
-    """`hasattr` and `getattr` with a default drop the error unread."""
+    """`hasattr`, and `getattr` with a default, drop the error without reading its message."""
     asked = []
     monkeypatch.setattr(
         "osimlite.schema.base.describe_unknown_property",
@@ -249,7 +252,7 @@ def test_the_docstring_has_every_property(cls):
     if own is None:
         return
     assert own.splitlines()[0] in cls.__doc__
-    # That is what `help` shows; to lay it out takes a hundred times as long.
+    # `help` shows the properties too; formatting them takes a hundred times as long.
     text = inspect.getdoc(cls)
     assert text is not None
     section = text.split("Properties, in the order of a file:")[1]

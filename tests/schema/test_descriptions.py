@@ -1,4 +1,4 @@
-"""Every property says what it means, wherever people look for it."""
+"""Check that every property has a description, in every place where users look for it."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def test_every_property_has_a_meaning(key: str) -> None:
 
 @of_each(CLASSES, lambda cls: cls.tag)
 def test_what_is_written_in_ticks_exists(cls: type[Object]) -> None:
-    """Names of other properties in a text are those of the same object, of a part of it, or of what owns it."""
+    """Words in backticks name properties of the same object, of one of its parts, or of its owner."""
     known = {
         name
         for each in CLASSES
@@ -100,7 +100,7 @@ def test_the_json_schema_says_it() -> None:
 
 @pytest.mark.parametrize("compiled", [False, True])
 def test_in_an_archive(compiled: bool, tmp_path: Path) -> None:
-    """Where the sources are zipped, meanings are found; where there is only the compiled form, they are empty."""
+    """Descriptions are found in zipped sources, and are empty if only compiled modules exist."""
     package, archive = Path(osimlite.__file__).parent, tmp_path / "archive.zip"
     if compiled:
         with zipfile.PyZipFile(str(archive), "w") as target:

@@ -1,4 +1,4 @@
-"""Differences of meaning."""
+"""Check the differences of meaning between two models."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def test_a_model_does_not_differ_from_its_copies(walker: Model) -> None:
 
 
 def test_writing_defaults_down_and_spelling_paths_differently_change_nothing(walker: Model) -> None:
-    """The file spells every frame's axes out; the model made in Python leaves them to their defaults."""
+    """The file states the axes of every frame, the model made in Python leaves them at their defaults."""
     assert find_differences(walker, dynamic_walker()) == []
 
 
@@ -43,7 +43,10 @@ def test_every_kind_of_change(walker: Model) -> None:
 
 
 def test_of_another_class_counts_what_both_have() -> None:
-    """And the parts that a class makes for itself count for nothing."""
+    """Only properties that both classes have are compared.
+
+    Parts that a class creates itself are ignored.
+    """
     old, new = Model(name="m"), Model(name="m")
     old.add(osimlite.Thelen2003Muscle(name="soleus", max_isometric_force=100.0))
     new.add(osimlite.RigidTendonMuscle(name="soleus", max_isometric_force=200.0, min_control=0.01))

@@ -1,4 +1,4 @@
-"""Changing a model with references kept right."""
+"""Check that changes of a model keep its references right."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from osimlite.schema.model import Model
 
 
 def targets(model: Model) -> list[str]:
-    """What every reference leads to, as the place of the component in the tree."""
+    """Return the target of every reference, as the index of the component in the tree."""
     place = {id(component): number for number, component in enumerate(model.components())}
     return [
         f"{use.spec.tag} {place[id(model.tree().resolve(use).target)]}"
@@ -134,7 +134,7 @@ def test_a_model_takes_no_second_component_of_a_name(walker: Model) -> None:
     walker.add(body)
     with pytest.raises(ModelError, match="Body 'Head' is in the model already"):
         walker.add(body)
-    # A joint of that name is another matter: it has another path.
+    # A joint may have the same name, because its path differs.
     walker.add(PinJoint(name="Pelvis"))
     assert walker["/jointset/Pelvis"].path == "/jointset/Pelvis"
 

@@ -1,4 +1,4 @@
-"""Facts that a class has from its base: each one is listed, with what OpenSim was seen to do for the class."""
+"""List all facts that a class inherits from its base, with what OpenSim does for the class (measured)."""
 
 from __future__ import annotations
 
@@ -38,26 +38,26 @@ SOLVER = (
 
 INHERITED = {
     **{("MocoCasADiSolver", name): HOLDS for name in SOLVER},
-    # With an optimal_force of 1, 0 and -1 OpenSim computes the same accelerations, or refuses all
+    # OpenSim computes the same accelerations with an optimal_force of 1, 0 and -1, or rejects all
     # three.
     **{
         (name, "optimal_force"): UNUSED
         for name in (*MUSCLES, "ClutchedPathSpring", "McKibbenActuator")
     },
 }
-"""What of the facts about numbers outside their domain each class has from its base."""
+"""Inherited facts about numbers outside of their domain, by class and property."""
 
 NUMBERS = {"vmax", "fvmax", "rise", "fall"}
 NOT_THERE = {
     "DeGrooteFregly2016Muscle": {"fvmax"},
-    # The translator reads these two by the laws of their classes.
+    # The translator reads these two classes by their own laws.
     "Delp1990Muscle_Deprecated": NUMBERS,
     "Schutte1993Muscle_Deprecated": NUMBERS,
     "MeyerFregly2016Muscle": {"fvmax"},
-    # Without activation dynamics, as the report of the translator says.
+    # The muscle has no activation dynamics, as the report of the translator says.
     "RigidTendonMuscle": {"fvmax", "rise", "fall"},
 }
-"""Numbers of MuJoCo's muscle that a class has no property for: the translator takes a default."""
+"""Parameters of MuJoCo's muscle without a property of the class; the translator uses a default."""
 
 
 def find_classes() -> Iterator[type[Object]]:
@@ -69,7 +69,7 @@ def find_classes() -> Iterator[type[Object]]:
 
 
 def find_named(facts: Facts) -> set[str]:
-    """Return the properties of which facts say what becomes of a number outside its domain."""
+    """Return the properties for which facts state the consequence of a number outside of its domain."""
     texts = [*facts.outside.values(), *facts.zero.values(), *facts.missing.values(), facts.refused]
     return {name for text in texts for name in text.split()} | {*facts.doubtful}
 
@@ -85,7 +85,7 @@ def test_every_inherited_fact_is_listed() -> None:
 
 
 def actuator_of(name: str, force: int) -> str:
-    """Return a model with an actuator that names its optimal force."""
+    """Return the text of a model with an actuator that states its optimal force."""
     if "Coordinate" in name:
         inside = "<coordinate>q</coordinate>"
     else:
@@ -107,7 +107,7 @@ def test_the_linter_reports_an_inherited_fact_only_where_it_holds(name: str) -> 
 
 
 def find_missing_numbers(cls: type[Muscle]) -> set[str]:
-    """Return the numbers of MuJoCo's muscle whose property, as the class or its base names it, is not there."""
+    """Return the parameters of MuJoCo's muscle whose property does not exist in the class."""
     named: dict[str, str] = {}
     for base in reversed(cls.__mro__):
         named.update(base.__dict__.get("facts", Facts()).mujoco)

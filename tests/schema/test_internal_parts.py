@@ -1,4 +1,7 @@
-"""Parts that OpenSim makes for itself: they have a path, are in no file, and stay the same while their owner lives."""
+"""Check the parts that OpenSim creates itself.
+
+They have a path, are in no file, and stay the same objects while their owner exists.
+"""
 
 from __future__ import annotations
 

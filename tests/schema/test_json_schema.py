@@ -1,4 +1,7 @@
-"""The JSON Schema in `schemas/` is the one the declarations give, and it judges as the reader of data does."""
+"""Check the JSON Schema in `schemas/`.
+
+It must be generated from the declarations, and accept what the reader of data accepts.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +23,8 @@ jsonschema = pytest.importorskip("jsonschema")
 @pytest.fixture(scope="module")
 def validator() -> Any:
     schema = make_json_schema()
-    # One function makes all definitions; to check them takes longer than all other tests here.
+    # One function makes all definitions, and checking them takes longer than all other tests here.
+    # A quick run therefore checks one in six.
     definitions = [*schema["$defs"].items()][:: choose(6, 1)]
     jsonschema.Draft202012Validator.check_schema({**schema, "$defs": dict(definitions)})
     return jsonschema.Draft202012Validator(schema)

@@ -1,4 +1,4 @@
-"""What is said when Python code gives components what they do not take."""
+"""Check the messages when Python code sets a component to an unsuitable value."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The component tree and the rules of references."""
+"""Check the component tree and the rules of references."""
 
 from __future__ import annotations
 

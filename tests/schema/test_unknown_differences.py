@@ -1,4 +1,4 @@
-"""Objects of classes that nobody knows are compared by their values."""
+"""Check that objects of unknown classes are compared by their values."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ LIGAMENT = (
 
 
 def compare(new: str) -> list[tuple[str, str | None, str | None]]:
-    """Return what differs between two models with such an object."""
+    """Return the differences between a model with a ligament and one with another text in its place."""
     old_model, new_model = (read_text(small_model(forces=text)) for text in (LIGAMENT, new))
     return [(item.what, item.old, item.new) for item in find_differences(old_model, new_model)]
 
