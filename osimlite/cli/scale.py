@@ -114,6 +114,7 @@ def scale(
         say(f"{name}: {ratio:.6g}")
     for note in result.measured.notes:
         say(f"left out: {note}")
+    say(f"mass: {result.describe_mass()}")
     if result.placed is not None:
         for line in result.placed.describe_pose():
             say(line)

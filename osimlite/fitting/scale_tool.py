@@ -20,7 +20,7 @@ from osimlite.io.document.cache import read_copy
 from osimlite.io.document.printer import to_text
 from osimlite.io.tables.storage import expect_time_range
 from osimlite.schema.base import Object
-from osimlite.schema.frames import PhysicalFrame
+from osimlite.schema.frames import Body, PhysicalFrame
 from osimlite.schema.markers import MarkerSet
 from osimlite.schema.model import Model
 from osimlite.schema.tools.ik_tasks import IKTask
@@ -52,6 +52,7 @@ class ScaledModel:
         placed: new positions of the markers; None if they were not placed.
         texts: texts of the files that the tool writes, by path from the folder of the setup.
         unknown: message about parts of unknown classes, which keep their size; "" without any.
+        masses: total mass before and after scaling, kg; None if the model was not scaled.
     """
 
     model: Model
@@ -59,6 +60,21 @@ class ScaledModel:
     placed: MarkerPlacement | None = None
     texts: dict[str, str] = field(default_factory=dict)
     unknown: str = ""
+    masses: tuple[float, float] | None = None
+
+    def describe_mass(self) -> str:
+        """Return a text about the change of the mass; "" if the model was not scaled."""
+        if self.masses is None:
+            return ""
+        before, after = self.masses
+        text = f"scaled from {before:.5g} to {after:.5g} kg"
+        # Typical mistakes are grams, pounds and a missing digit.
+        is_plausible = before / LARGEST_MASS_RATIO <= after <= before * LARGEST_MASS_RATIO
+        return text if is_plausible else f"{text}; is the mass of the subject in kg?"
+
+
+LARGEST_MASS_RATIO = 4.0
+"""Larger ratios of the masses of subject and model are probably an error of the unit."""
 
 
 UNSCALED = "Such parts are not scaled, and keep the size of the generic model"
@@ -149,10 +165,19 @@ def scale(
         preserve_mass_distribution=preserve_mass_distribution,
         mechanism=mechanism,
     )
-    result = ScaledModel(copy, measuring.result, unknown=describe_unknown(model, UNSCALED))
+    result = ScaledModel(
+        copy,
+        measuring.result,
+        unknown=describe_unknown(model, UNSCALED),
+        masses=(_sum_masses(model), _sum_masses(copy)),
+    )
     if place and data is not None:
         result.placed = place_markers(copy, data, tasks, start, end)
     return result
+
+
+def _sum_masses(model: Model) -> float:
+    return sum(body.mass for body in model.components(Body))
 
 
 def _create_measurements(pairs: MeasurementPairs) -> list[Measurement]:
@@ -207,7 +232,9 @@ def compute_scaled_model(tool: ScaleTool, folder: Path) -> ScaledModel:
     # OpenSim names the scaled model after the setup, before markers are placed.
     model.name = tool.name
     if scaler.apply:
+        mass_before = _sum_masses(model)
         result.measured = _scale_by_setup(tool, model, folder)
+        result.masses = (mass_before, _sum_masses(model))
         frames = [frame.name for frame in model.components(PhysicalFrame)]
         _add_text(result, scaler.output_model_file, model)
         _add_text(result, scaler.output_scale_file, create_scale_set(frames, result.measured))

@@ -122,6 +122,7 @@ def run_scale_tool(job: Job, outcome: Outcome) -> None:
             outcome.add_message(name, f"scaled by {ratio:.6g}")
         for note in result.measured.notes:
             outcome.add_message("left out", note)
+        outcome.add_message("mass", result.describe_mass())
     if result.placed is not None:
         outcome.summary |= result.placed.pose.summary
         for message in result.placed.describe_pose():

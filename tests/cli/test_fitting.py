@@ -145,6 +145,13 @@ def test_a_model_is_scaled(lab: Path) -> None:
     )
 
 
+def test_a_mass_in_grams_is_doubted(lab: Path) -> None:
+    for mass, is_doubted in (("2", False), ("2000", True)):
+        done = run("scale", "box.osim", "--mass", mass, folder=lab)
+        assert done.code == 0 and f"mass: scaled from 1 to {mass} kg" in done.out
+        assert ("is the mass of the subject in kg?" in done.out) == is_doubted
+
+
 def test_a_model_is_fitted_to_a_person(lab: Path) -> None:
     """Markers of --hold keep their positions; the written setup reproduces the model."""
     done = run(
