@@ -4,7 +4,17 @@ from __future__ import annotations
 
 from inspect import cleandoc
 
-from osimlite.lint.registry import FAILS, FAMILIES, NAN, REFUSES, RUNS, Rule, all_rules, rule_groups
+from osimlite.lint.registry import (
+    ERROR,
+    FAILS,
+    FAMILIES,
+    NAN,
+    REFUSES,
+    RUNS,
+    Rule,
+    all_rules,
+    rule_groups,
+)
 
 _FIX_TEXTS = {
     "": "none",
@@ -43,7 +53,11 @@ def format_rule_page(rule: Rule) -> str:
         "",
         f"Severity: {describe_severity(rule)}",
         f"Fix: {_FIX_TEXTS[rule.fixes]}",
-        *([f"OpenSim: {describe_consequences(rule)}"] if rule.consequences else []),
+        *(
+            [f"{_label_consequences(rule)}: {describe_consequences(rule)}"]
+            if rule.consequences
+            else []
+        ),
         "",
         rule.page,
     ]
@@ -72,6 +86,11 @@ def describe_severity(rule: Rule) -> str:
         f"{rule.severity.value}; {rule.before[1].value} in files of a version before "
         f"{rule.before[0]}"
     )
+
+
+def _label_consequences(rule: Rule) -> str:
+    # Consequences are those of errors; a rule of another severity reports errors as well.
+    return "OpenSim" if rule.severity is ERROR else "OpenSim, if the finding is an error"
 
 
 def describe_consequences(rule: Rule) -> str:

@@ -190,6 +190,7 @@ def test_a_page_says_severity_mends_and_settings():
     assert "Fix: sometimes, with --fix\n" in pages["OSIM104"]
     assert "\nOpenSim: refuses the file, or computes NaN\n" in pages["OSIM407"]
     assert "\nOpenSim: " not in pages["OSIM311"]
+    assert "\nOpenSim, if the finding is an error: refuses the file\n" in pages["OSIM701"]
     assert (
         "- `contact-depth = 0.001` (m): surfaces may start this deep inside each other"
         in pages["OSIM521"]
