@@ -318,5 +318,7 @@ def _exit_with_message(error: BaseException, words: list[str]) -> NoReturn:
     message = _describe_wrong_number(error, words) or error.format_message().rstrip(".")
     if words[0] not in COMMANDS and words[0] in COMMAND_SYNONYMS:
         message += f", use '{COMMAND_SYNONYMS[words[0]]}'"
-    complain(f"{message}; '{path} --help' shows the usage")
+    # A suggestion of typer ends with a question mark.
+    separator = "" if message.endswith("?") else ";"
+    complain(f"{message}{separator} '{path} --help' shows the usage")
     raise SystemExit(2) from None

@@ -90,9 +90,11 @@ def add_controls(
     begin, end = -inf, inf
     for key, value in _map_by_name(user_controls).items():
         if key not in path_of_name:
-            raise SettingError(
-                f"the model has no actuator '{key}' to control{suggest_name(key, path_of_name)}"
+            # Tables of OpenSim's tools have controls of the actuators that their setups add.
+            advice = suggest_name(key, path_of_name) or (
+                "; if it is in the force_set_files of a setup, add these forces to the model first"
             )
+            raise SettingError(f"the model has no actuator '{key}' to control{advice}")
         # A name is ambiguous in models with several sets.
         paths = [name for name in controls.names if name.endswith(f"/{key}")]
         if len(paths) > 1:

@@ -122,7 +122,8 @@ def run(
     class_name = type(setup_object).__name__
     if class_name not in TOOLS:
         raise NotRunnable(
-            f"osimlite cannot run {add_article(class_name)}; it runs {join_words(list_runnable())}",
+            f"osimlite cannot run {add_article(class_name)}; it runs "
+            f"{join_words(list_runnable(), max_count=20)}",
             file=str(file),
         )
     # An option without effect would suggest results that it does not give.
