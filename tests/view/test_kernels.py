@@ -28,9 +28,7 @@ MODELS = [
     "m0923",
     "m0954",
 ]
-"""Corpus models with couplers that depend on each other, ball joints, moving path points, all wrap surfaces and
-constraints between bodies.
-"""
+"""Corpus models with chained couplers, ball joints, moving path points, all wrap surfaces and body constraints."""
 
 FOUND = """([program, lines, poses, asked]) => {
   const mechanism = new window.osimlite.Mechanism({ program, lines });
@@ -44,9 +42,7 @@ FOUND = """([program, lines, poses, asked]) => {
 
 @pytest.fixture(scope="module")
 def found(chromium):
-    """Yield a function that returns coordinates, poses, path corners, lengths and moment arms as the page computes
-    them.
-    """
+    """Yield a function that lets the page compute coordinates, poses, path corners, lengths and moment arms."""
     page = chromium.new_page()
 
     def of(mechanism, poses, routes=(), asked=()):
