@@ -1,4 +1,4 @@
-"""C++ text of kernels as functions that Python calls, and the same functions as Python on the same vectors."""
+"""Compile and call C++ kernels, and call the same kernels as Python on the same vectors."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ needs_compiler = pytest.mark.skipif(
     COMPILER is None, reason="needs a C++ compiler on the PATH, or in CXX"
 )
 
-# A function that only tests use may have variables that nothing reads.
+# Functions that only tests use may contain unused variables.
 WARNINGS = "-Wall -Wextra -Wpedantic -Werror -Wno-unused -Wno-unused-parameter"
 FLAGS = "-std=c++17 -fPIC -shared -fvisibility=hidden -ffp-contract=off -fno-exceptions"
 SIZE = 40
@@ -44,11 +44,11 @@ def build_library(folder, text, *flags, compiler=COMPILER, name="kernels"):
     A library with a sanitizer must not be loaded here: it ends a process that did not start with it.
 
     Args:
-        folder: for the files.
-        text: of one translation unit.
-        flags: for the compiler, `-O1` if there are none.
-        compiler: the command.
-        name: of the files.
+        folder: folder of the files.
+        text: text of one translation unit.
+        flags: options of the compiler; `-O1` by default.
+        compiler: command of the compiler.
+        name: name of the files without suffix.
     """
     (folder / HEADER).write_text(header_text())
     source, library = folder / f"{name}.cpp", folder / f"{name}.so"
@@ -62,10 +62,17 @@ def build_library(folder, text, *flags, compiler=COMPILER, name="kernels"):
 
 
 def call_library(library, symbol, ints, floats, count):
-    """Call an exported kernel of integers, floats, results and a count.
+    """Call an exported kernel with integers, floats, a vector of results and a count.
+
+    Args:
+        library: loaded library.
+        symbol: exported name.
+        ints: integers.
+        floats: floats.
+        count: count.
 
     Returns:
-        What it returns, and the three vectors after the call.
+        Return value of the kernel, and the three vectors after the call.
     """
     kernel = getattr(library, symbol)
     kernel.restype = ctypes.c_int64
@@ -76,14 +83,14 @@ def call_library(library, symbol, ints, floats, count):
 
 
 def call_python(function, ints, floats, count):
-    """Call a kernel as Python; the results are those of `call_library`."""
+    """Call a kernel as Python; arguments and results are those of `call_library`."""
     vectors = array("q", ints), array("d", floats), array("d", [0.0] * SIZE)
     result = function(*map(memoryview, vectors), count)
     return [int(result), *(vector.tolist() for vector in vectors)]
 
 
 def are_same_bits(one, two):
-    """Return whether two results are the same numbers; every NaN is the same."""
+    """Return whether two results have the same bits; all NaN count as equal."""
     if isinstance(one, list):
         return len(one) == len(two) and all(map(are_same_bits, one, two))
     if isinstance(one, float) and isinstance(two, float):

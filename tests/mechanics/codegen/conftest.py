@@ -1,4 +1,4 @@
-"""The browser that runs JavaScript."""
+"""Fixture of the browser that runs JavaScript."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Functions in the restricted Python of kernels, one for each group of its constructs.
 
-Each takes integers, floats, a vector for its results and a count, as kernels do, and returns an
-integer. The tests run them as Python, as C++ and as JavaScript.
+Each takes integers, floats, a vector for its results and a count, as kernels do, and returns an integer. The tests run
+them as Python, as C++ and as JavaScript.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ LIMIT = -inf
 
 
 class Point(NamedTuple):
-    """A record of a float, an integer and a tuple."""
+    """Named tuple of a float, an integer and a tuple."""
 
     size: float
     number: int
@@ -30,7 +30,7 @@ class Point(NamedTuple):
 
 
 class Pair(NamedTuple):
-    """A record whose fields have names that C++ or JavaScript keep for themselves."""
+    """Named tuple whose fields have names that are reserved in C++ or JavaScript."""
 
     new: float
     delete: float
@@ -38,7 +38,7 @@ class Pair(NamedTuple):
 
 # ------------------------------------------------------------------------------------------------- arithmetic
 def divide_and_round(s: Ints, x: Floats, out: Floats, count: int) -> int:
-    """Divisions, remainders and powers of floats and integers of either sign."""
+    """Use divisions, remainders and powers of floats and integers of either sign."""
     a, b = x[0], x[1] + 3.25
     out[0], out[1] = a // b, a % b
     out[2], out[3] = a // -b, a % -b
@@ -60,7 +60,7 @@ def divide_and_round(s: Ints, x: Floats, out: Floats, count: int) -> int:
 
 
 def use_bits(s: Ints, x: Floats, out: Floats, count: int) -> int:
-    """Bits of integers, which JavaScript has not as many of."""
+    """Use bits of integers, of which JavaScript has fewer."""
     k, m = s[0], s[1]
     out[0], out[1], out[2] = k & m, k | 8, k ^ 3
     out[3], out[4] = k >> 1, k << m
@@ -75,7 +75,7 @@ def use_bits(s: Ints, x: Floats, out: Floats, count: int) -> int:
 
 
 def round_to_integers(s: Ints, x: Floats, out: Floats, count: int) -> int:
-    """Functions whose results are integers or truth values."""
+    """Use functions whose results are integers or truth values."""
     a = 1.75 if isnan(x[0]) or isinf(x[0]) else x[0]
     out[0], out[1], out[2] = int(a), floor(a), ceil(a)
     out[3], out[4], out[5] = int(-2.5), floor(-2.5), ceil(-2.5)
@@ -89,7 +89,7 @@ def round_to_integers(s: Ints, x: Floats, out: Floats, count: int) -> int:
 
 
 def compare(s: Ints, x: Floats, out: Floats, count: int) -> int:
-    """Comparisons, chains of them, membership, and `and` and `or` of truth values and numbers."""
+    """Use comparisons, chained comparisons, membership, and `and` and `or` of truth values and numbers."""
     a, b = x[0], x[1]
     k = s[0]
     out[0], out[1], out[2], out[3] = a < b, a <= b, a == b, a != b
@@ -125,7 +125,7 @@ def compare(s: Ints, x: Floats, out: Floats, count: int) -> int:
 
 
 def choose(s: Ints, x: Floats, out: Floats, count: int) -> int:
-    """Conditional expressions of numbers and tuples, within one another."""
+    """Use nested conditional expressions of numbers and tuples."""
     a, b = x[0], x[1]
     out[0] = a if a > b else b if b > 0.0 else -1.0
     out[1] = (a if a > 0.0 else 1) + (2 if b > 0.0 else 0.5)
@@ -140,24 +140,24 @@ def choose(s: Ints, x: Floats, out: Floats, count: int) -> int:
 
 # ---------------------------------------------------------------------------------------------------- tuples
 def make_point(size: float, number: int) -> Point:
-    """A record with a default, from either of two returns."""
+    """Return a named tuple from one of two return statements, the second of which uses a default."""
     if number > 1:
         return Point(size, number, (1, size), 3)
     return Point(size, number, (size, 2.0))
 
 
 def sum_items(a: float, b: float, c: float, d: float = 0.25) -> float:
-    """A function of several numbers, the last of which has a default."""
+    """Return a weighted sum; the last argument has a default."""
     return a + 10.0 * b + 100.0 * c + 1000.0 * d
 
 
 def first_two(point: tuple[float, ...], weight: float) -> tuple[float, float]:
-    """A tuple from one."""
+    """Return a tuple that is computed from the beginning of another one."""
     return weight * point[0], weight * point[1]
 
 
 def use_tuples(s: Ints, x: Floats, out: Floats, count: int) -> int:
-    """Tuples, records, constants, and their items."""
+    """Use tuples, named tuples, constants, and their items."""
     a, b = x[0], x[1]
     triple = (a, b, 2.0)
     out[0], out[1], out[2] = triple
@@ -192,7 +192,7 @@ def use_tuples(s: Ints, x: Floats, out: Floats, count: int) -> int:
 
 # ----------------------------------------------------------------------------------------------------- loops
 def repeat(s: Ints, x: Floats, out: Floats, count: int) -> int:
-    """Loops over ranges and tuples, that end early, skip, change their variable, and leave it behind."""
+    """Use loops over ranges and tuples that end early, skip rounds, change their variable and use it afterwards."""
     total = x[0]
     for k in range(count):
         k = 2 * k
@@ -237,7 +237,7 @@ def repeat(s: Ints, x: Floats, out: Floats, count: int) -> int:
 
 
 def leave(s: Ints, x: Floats, out: Floats, count: int) -> int:
-    """Returns from within loops and branches, and variables that only one branch sets."""
+    """Return from within loops and branches, and use variables that only one branch sets."""
     for k in range(count):
         if x[k % 4] > 1.0:
             found = k
@@ -260,34 +260,34 @@ def leave(s: Ints, x: Floats, out: Floats, count: int) -> int:
 
 
 def widen(value: float, count: int) -> float:
-    """An argument that becomes wider than what it is called with."""
+    """Change the type of an argument from integer to float within a loop."""
     for _ in range(count):
         value = value / 2
     return value
 
 
 def half_or_none(value: float) -> float:
-    """One function for integers and for floats."""
+    """Compute a number that is an integer for an integer, and a float for a float."""
     return value * 3 - 1
 
 
 def apply(function: Any, a: float, b: float) -> float:
-    """A function that is called with another."""
+    """Call a function that is an argument."""
     return function(a, b) + 1.0
 
 
 def add(a: float, b: float) -> float:
-    """A sum."""
+    """Return a sum."""
     return a + b
 
 
 def subtract(a: float, b: float) -> float:
-    """A difference."""
+    """Return a difference."""
     return a - b
 
 
 def specialise(s: Ints, x: Floats, out: Floats, count: int) -> int:
-    """Functions of different types, and functions as arguments."""
+    """Use functions with arguments of different types, and functions as arguments."""
     out[0], out[1] = widen(s[0], 1), widen(x[0], 2)
     out[2], out[3] = half_or_none(s[0]), half_or_none(x[0])
     out[4], out[5] = apply(add, x[0], 2.0), apply(subtract, x[0], s[0])
@@ -308,18 +308,18 @@ def push(v: Floats, k: int) -> float:
 
 
 def push_two(v: Floats) -> tuple[float, float]:
-    """The same as two numbers."""
+    """Count in v[0], and return the count and its double."""
     v[0] += 1.0
     return v[0], 2.0 * v[0]
 
 
 def mix(a: float, b: float, c: float) -> float:
-    """A number in which the order of the arguments shows."""
+    """Return a number that depends on the order of the arguments."""
     return a - 3.0 * b + 7.0 * c
 
 
 def keep_order(s: Ints, x: Floats, out: Floats, count: int) -> int:
-    """Calls that write memory, as operands and arguments beside others that read or write it."""
+    """Call functions that write memory, as operands and arguments next to others that read or write it."""
     w = at(out, 20)
     w[0] = x[0]
     out[0] = mix(push(w, 1), w[0], push(w, 2))
@@ -353,7 +353,7 @@ def keep_order(s: Ints, x: Floats, out: Floats, count: int) -> int:
 
 
 def move_pointers(s: Ints, x: Floats, out: Floats, count: int) -> int:
-    """Vectors from a place on, their items as targets, and integers that are stored."""
+    """Use vectors from an offset, assignments to their items, and integers that are stored."""
     rest = at(out, 2)
     rest[0], rest[1] = x[1], rest[0]
     inner = at(rest, s[1])
@@ -378,7 +378,7 @@ def move_pointers(s: Ints, x: Floats, out: Floats, count: int) -> int:
 
 
 def evaluate_mathematics(s: Ints, x: Floats, out: Floats, count: int) -> int:
-    """Functions of numbers, with the sign of zero."""
+    """Use mathematical functions whose results are exact, with the sign of zero."""
     a = x[0] if isfinite(x[0]) else 0.5
     out[0], out[1] = sqrt(abs(a)), copysign(2.0, a)
     out[2], out[3] = copysign(a, -0.0), atan2(a, -0.0)
@@ -390,7 +390,7 @@ def evaluate_mathematics(s: Ints, x: Floats, out: Floats, count: int) -> int:
 
 
 def compute_series(s: Ints, x: Floats, out: Floats, count: int) -> int:
-    """The functions of `math` that have no counterpart in JavaScript, and those that have."""
+    """Use functions of `math` with and without a counterpart in JavaScript."""
     a = x[0] if isfinite(x[0]) else 0.5
     b = max(-0.9, min(0.9, a))
     out[0], out[1], out[2] = math.erf(a), math.erfc(a), math.radians(a)
@@ -406,7 +406,7 @@ EXACT = (
     divide_and_round, round_to_integers, compare, choose, use_tuples, repeat, leave, specialise, keep_order,
     move_pointers, evaluate_mathematics,
 )  # fmt: skip
-"""Functions whose results are the same bits everywhere, but for the sign of zero in JavaScript."""
+"""Functions whose results have the same bits everywhere, except for the sign of zero in JavaScript."""
 
 INPUTS = [
     ((2, 3, 0, 0), (0.5, -1.25, 2.0, 0.75), 0),
@@ -417,4 +417,4 @@ INPUTS = [
     ((3, 2, 0, 0), (-1.75, nan, 1.0, 0.0), 2),
     ((2, 1, 0, 0), (1e-310, -4.0, 3.5, 1e300), 3),
 ]
-"""Integers, floats and counts."""
+"""Integers, floats and count of each call."""

@@ -1,8 +1,8 @@
-"""Motions and derivatives of models by the kernels of one library, as digests of their bits.
+"""Print digests of motions and derivatives of models, computed by the kernels of one library.
 
-Run as a program: the path of a shared library with all kernels, the number of motions, and the
-number of models whose derivatives are computed; with `-` for the path, the kernels that osimlite
-takes anyway. Models of the shared folder come on top, half as many, where it is there.
+Arguments of the program: path of a shared library with all kernels, number of motions, and number of models whose
+derivatives are computed. With `-` for the path, osimlite selects its kernels as usual. Models of the shared folder are
+added, half as many, if it exists.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ from tests.simulation.force_cases import FORCES, with_force
 
 ROOT = Path(__file__).parents[3]
 DURATION = 0.1
-"""Seconds of each motion."""
+"""Duration of each motion (s)."""
 
 
 def list_models() -> dict[str, Any]:
-    """Return functions that make models, by name, which are there in every clone.
+    """Return functions that create models, by name, for models that exist in every clone.
 
     Built-in models come first, then one joint of each kind, then every force on a chain of bodies.
     """
@@ -44,7 +44,7 @@ def list_models() -> dict[str, Any]:
 
 
 def list_shared_models() -> dict[str, Any]:
-    """Return functions that make the models of the shared folder, by name; none without that folder."""
+    """Return functions that read the models of the shared folder, by name; an empty dictionary without it."""
     shared = next(
         (
             folder
@@ -60,7 +60,7 @@ def list_shared_models() -> dict[str, Any]:
 
 
 def load_kernels(path: str) -> None:
-    """Take all kernels from a library."""
+    """Make osimlite use the kernels of a library."""
     library = ctypes.CDLL(path)
     names = json.loads(Path(path).with_suffix(".json").read_text(encoding="utf-8"))
     machine_code.use_addresses(
@@ -72,7 +72,7 @@ def load_kernels(path: str) -> None:
 
 
 def describe(*arrays: Any) -> str:
-    """Return a digest of numbers; every NaN is the same."""
+    """Return a digest of arrays; all NaN count as equal."""
     parts = [
         np.where(np.isnan(array), np.nan, array).tobytes() for array in map(np.asarray, arrays)
     ]
@@ -91,16 +91,16 @@ def run(model: Any) -> str:
 
 
 def differentiate(model: Any) -> str:
-    """Return a digest of the rates of a model and their derivatives."""
+    """Return a digest of the state derivative of a model and of its Jacobians."""
     made = osimlite.tangents(model)
     controls = np.random.default_rng(1).uniform(0.05, 0.95, len(made.controls))
     return describe(*made.linear(0.1, made.x, controls))
 
 
 def collect(action: Any, count: int) -> dict[str, str]:
-    """Return the digests of so many models and of half as many of the shared folder.
+    """Return the digests of `count` models, and of half as many from the shared folder.
 
-    Models that cannot be computed are left out.
+    Models that raise an error are left out.
     """
     found: dict[str, str] = {}
     for models, limit in ((list_models(), count), (list_shared_models(), count + count // 2)):

@@ -1,4 +1,4 @@
-"""JavaScript of kernels, run by Node.js."""
+"""Run JavaScript kernels by Node.js."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ console.log(JSON.stringify(results));
 
 
 def call_javascript(text, calls):
-    """Call kernels of integers, floats, results and a count.
+    """Call JavaScript kernels with integers, floats, a vector of results and a count.
 
     Args:
-        text: the JavaScript of an object that has the kernels by name.
+        text: JavaScript text of an object that contains the kernels by name.
         calls: name, integers, floats and count of each call.
 
     Returns:
-        For each call, what it returns and the three vectors after it.
+        For each call, the return value and the three vectors afterwards.
     """
     given = [
         [name, list(map(_write, ints)), list(map(_write, floats)), count]

@@ -1,7 +1,6 @@
-"""The functions of numbers among the kernels and laws, each as a kernel that takes its arguments from vectors.
+"""Kernels that call the pure numerical functions of kernels and laws with arguments from vectors.
 
-Run as a program, it calls the functions of a library many times, for builds that end at undefined
-behaviour.
+As a program, it calls the functions of a library many times, for builds that stop at undefined behaviour.
 """
 
 from __future__ import annotations
@@ -26,10 +25,13 @@ SPECIAL = math.nan, math.inf, -math.inf, 0.0, -0.0, 1.0, -1.0, 1e-300, 1e300, -1
 
 
 def all_kernels(directions: int) -> dict[str, tuple[Callable[..., Any], int]]:
-    """Return what the library of osimlite exports.
+    """Return the kernels that the library of osimlite exports.
 
     Args:
-        directions: number of the derivatives; 0 for plain numbers.
+        directions: number of derivative directions; 0 for plain numbers.
+
+    Returns:
+        Function and number of directions, by exported symbol.
     """
     return {get_symbol(name): find_law(name) for name in list_library_laws(directions)}
 
@@ -42,7 +44,7 @@ def is_of_numbers(kind: Type | None) -> bool:
 
 
 def wrap_functions() -> dict[Callable[..., Any], Callable[..., int]]:
-    """Return, for each function of numbers, a kernel that calls it."""
+    """Return, for each pure numerical function, a kernel that calls it."""
     library = make_library(all_kernels(0))
     wrapped: dict[Callable[..., Any], Callable[..., int]] = {}
     for part in library.specialisations:
@@ -93,12 +95,12 @@ def _items(text: str, kind: Any) -> list[str]:
 
 
 def make_arguments(symbol: str, seed: int, hard: float) -> tuple[array[int], array[float]]:
-    """Return integers and floats for a wrapped function.
+    """Return random integers and floats for a wrapped function.
 
     Args:
-        symbol: its name.
-        seed: of the random numbers.
-        hard: the part of the floats that are zeros, infinite, no numbers, or the like.
+        symbol: name of the kernel.
+        seed: seed of the random numbers.
+        hard: fraction of the floats that are special, such as zeros, infinity or NaN.
     """
     rng = random.Random(seed)
     floats = (
@@ -109,7 +111,7 @@ def make_arguments(symbol: str, seed: int, hard: float) -> tuple[array[int], arr
     )
     integers = [rng.randint(-3, 6) for _ in range(SIZE)]
     if symbol.startswith("pure_bezier_"):
-        # Indices of a tuple of coefficients: the first, how far apart, and a count of rounds.
+        # These functions take indices of coefficients: the first index, a stride, and a number of iterations.
         integers[:3] = 0, 1, 3
     return array("q", integers), array("d", floats)
 

@@ -1,8 +1,7 @@
 """Random functions in the restricted Python of kernels, from a seed.
 
-They are made of all constructs but those whose results differ between the languages by intent:
-powers of floats, which compiled code computes as products, and the sign of an integer zero, which
-JavaScript has.
+They contain all constructs except those whose results differ between the languages by intent: powers of floats, which
+compiled code computes as products, and the sign of an integer zero, which exists in JavaScript.
 """
 
 from __future__ import annotations
@@ -17,11 +16,11 @@ from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 
 FLOATS = "0.5", "-1.25", "2.0", "1e-3", "7.75", "0.0", "-0.5", "3.0", "1e3"
 DEPTH = 3
-"""How deep expressions are."""
+"""Largest depth of expressions."""
 
 
 class Record(NamedTuple):
-    """A record that the functions make and read."""
+    """Named tuple that the functions create and read."""
 
     size: float
     number: int
@@ -33,7 +32,7 @@ CODES = 2, -3, 5, 0
 
 
 class Writer:
-    """Writes one kernel and the functions that it calls."""
+    """Writer of one kernel and of the functions that it calls."""
 
     def __init__(self, seed: int) -> None:
         self.rng = random.Random(seed)
@@ -49,15 +48,15 @@ class Writer:
 
     # ------------------------------------------------------------------------------------------------ helpers
     def pick(self, *choices: Any) -> Any:
-        """Return one of several."""
+        """Return one of several options at random."""
         return self.rng.choice(choices)
 
     def chance(self, part: float) -> bool:
-        """Return whether something happens that does so in a part of all cases."""
+        """Return true with a probability."""
         return self.rng.random() < part
 
     def variables(self, kind: str) -> list[str]:
-        """Return the variables of a kind that have a value here."""
+        """Return the variables of a type that have a value at this point."""
         return [name for name, own in self.scope.items() if own == kind]
 
     def new_name(self) -> str:
@@ -71,7 +70,7 @@ class Writer:
 
     @contextmanager
     def block(self, head: str) -> Any:
-        """Add a compound statement; what it gives a first value is not known after it."""
+        """Add a compound statement; variables that are first set in it are unknown after it."""
         self.write(head)
         before, self.indent = dict(self.scope), self.indent + 1
         size = len(self.lines)
@@ -113,7 +112,7 @@ class Writer:
         return self.pick(*choices)
 
     def argument(self, kind: str, depth: int) -> str:
-        """Return an expression of a kind."""
+        """Return an expression of a type."""
         if kind == "vector":
             return f"at({self.pick(*self.vectors)}, {self.index(0)} % 3)"
         if kind == "function":
@@ -124,7 +123,7 @@ class Writer:
 
     @staticmethod
     def small(text: str) -> str:
-        """Return an expression between -99 and 99."""
+        """Return an expression that is limited to -99 to 99."""
         return f"max(-99.0, min(99.0, {text}))"
 
     def index(self, depth: int = DEPTH) -> str:
@@ -187,7 +186,7 @@ class Writer:
         getattr(self, f"write_{kind}")(depth)
 
     def target(self, kind: str) -> str:
-        """Return a variable that may be stored in."""
+        """Return a variable that may be assigned."""
         names = [name for name in self.variables(kind) if not name.startswith("loop")]
         name = self.pick(*names) if names and self.chance(0.6) else self.new_name()
         return name
@@ -234,7 +233,7 @@ class Writer:
         self.write(f"{', '.join(places)} = {', '.join(values)}")
 
     def write_record(self, depth: int) -> None:
-        """Add a record, or take one apart."""
+        """Create a named tuple, or unpack one."""
         names = self.variables("record")
         if names and self.chance(0.5):
             a, b, c, d = (self.new_name() for _ in range(4))
@@ -277,7 +276,7 @@ class Writer:
         self.loops -= 1
 
     def write_while(self, depth: int) -> None:
-        """Add a loop that ends after a few rounds whatever happens."""
+        """Add a loop that ends after a few rounds in any case."""
         count = self.new_name()
         self.write(f"{count} = 0")
         self.loops += 1
@@ -287,7 +286,7 @@ class Writer:
         self.loops -= 1
 
     def write_leave(self, depth: int) -> None:
-        """Add what ends a round or a loop, under a condition."""
+        """Add a conditional `break` or `continue`."""
         with self.block(f"if {self.truth(1)}:"):
             self.write(self.pick("break", "continue"))
 
@@ -299,7 +298,7 @@ class Writer:
         self.vectors = [own for own, kind in self.scope.items() if kind == "vector"]
         self.may_write = False
         before = self.helpers
-        # A function that is given no vector has no integers of one.
+        # A function without a vector argument cannot use items of vectors.
         self.helpers = []
         start = len(self.lines)
         self.lines.append(f"def {name}({', '.join(names)}):")
@@ -315,12 +314,12 @@ class Writer:
                     f"return {self.small(self.number(1)) if result == 'float' else self.pair(1)}"
                 )
         self.write(f"return {self.small(self.number(2)) if result == 'float' else self.pair(2)}")
-        # Integers of the kernel's own vector are not known here.
+        # The integer vector of the kernel is not visible here: replace it by constants.
         self.lines[start:] = [line.replace("s[", "CODES[") for line in self.lines[start:]]
         self.helpers = [*before, (name, kinds, result)]
 
     def kernel(self) -> str:
-        """Return the name of the kernel, after which the text is complete."""
+        """Complete the text, and return the name of the kernel."""
         prefix = f"random_{self.seed}"
         self.lines += [
             "def add_two(a, b):",
@@ -344,7 +343,7 @@ class Writer:
 
 
 def make_function(seed: int) -> Any:
-    """Return a random kernel of integers, floats, results and a count."""
+    """Compile a random kernel with integers, floats, results and a count as arguments."""
     writer = Writer(seed)
     name = writer.kernel()
     source = "\n".join(writer.lines) + "\n"
@@ -359,7 +358,12 @@ def make_function(seed: int) -> Any:
 
 
 def make_inputs(seed: int, count: int) -> list[tuple[tuple[int, ...], tuple[float, ...], int]]:
-    """Return integers, floats and counts to call a kernel with."""
+    """Return random integers, floats and counts for calls of a kernel.
+
+    Args:
+        seed: seed of the random numbers.
+        count: number of calls.
+    """
     rng = random.Random(-seed)
 
     def number() -> float:

@@ -1,4 +1,4 @@
-"""Functions that no kernel may be like, the words of their errors, and with how many derivatives they are tried."""
+"""Functions that the translators must refuse, the texts of the errors, and the numbers of derivative directions."""
 
 # mypy: ignore-errors
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Kernels become C++ that computes what they compute in Python, to the last bit."""
+"""Tests of the translation of kernels to C++: results equal those of Python to the last bit."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from tests.mechanics.codegen.compiled import (
 
 @pytest.fixture(scope="module")
 def library(tmp_path_factory):
-    """All functions of the module `constructs`, without a warning."""
+    """Compile all functions of the module `constructs` without warnings."""
     functions = (*constructs.EXACT, constructs.use_bits, constructs.compute_series)
     text = write_library({function.__name__: (function, 0) for function in functions})
     return compile_text(tmp_path_factory.mktemp("constructs"), text)
@@ -46,12 +46,12 @@ def test_functions_of_mathematics(library):
     for given in constructs.INPUTS:
         expected = call_python(constructs.compute_series, *given)
         result = call_library(library, "compute_series", *given)
-        # Both ask the same library of C, but a compiler may compute a constant itself.
+        # Both call the same C library, but a compiler may evaluate constants itself.
         assert result[3] == pytest.approx(expected[3], rel=1e-15, abs=0.0), given
 
 
 def convert(s: Ints, x: Floats, out: Floats, count: int) -> int:
-    """Numbers that are no integers."""
+    """Convert floats that do not fit into integers."""
     for k in range(4):
         s[k] = int(x[k])
     return math.floor(x[count])
@@ -83,7 +83,7 @@ def test_powers_by_floats_beyond_integers(tmp_path):
 
 
 def divide(s: Ints, x: Floats, out: Floats, count: int) -> int:
-    """Divisions by zero, at which Python raises an error."""
+    """Divide by zero, where Python raises an error."""
     out[0], out[1], out[2] = x[0] / x[3], x[1] / x[3], x[3] / x[3]
     out[3] = s[0] / s[3]
     return s[0] // s[3] + s[0] % s[3]
@@ -103,8 +103,8 @@ def test_division_by_zero_ends_nothing(tmp_path):
 
 # ------------------------------------------------------------------------------------------------------ text
 def branch(a: float, b: float) -> float:
-    """The larger of two numbers."""
-    # A comment that is no part of the code.
+    """Return the larger of two numbers, plus 3."""
+    # This comment must not appear in the code.
     larger = a
     if b > a:
         larger = b
@@ -146,7 +146,7 @@ def test_the_text_is_the_same_each_time():
 
 
 def twice(a: float) -> float:
-    """A kernel that shares nothing with another."""
+    """Return the double of a number; this kernel shares nothing with another."""
     return 2.0 * a
 
 

@@ -1,4 +1,4 @@
-"""The numbers with derivatives of C++ follow the rules of Python's, at corners and zeros of either sign too."""
+"""Tests of derivative rules in C++ against those in Python, also at corners and at zeros of either sign."""
 
 from __future__ import annotations
 
@@ -38,7 +38,12 @@ CHANGES = [(0.0, 1.0, -0.5), (2.0, -0.0, 0.25)]
 
 
 def write_function(function, which):
-    """Return a kernel that applies a function to numbers of x, of which some carry no derivatives."""
+    """Return a kernel that applies a function to the numbers in x.
+
+    Args:
+        function: function or operator.
+        which: for each argument, whether it carries derivatives.
+    """
     given = [
         f"x[{k}]" if carries else f"strip_derivatives(x[{k}])" for k, carries in enumerate(which)
     ]
@@ -72,7 +77,11 @@ CASES = [
 
 @pytest.fixture(scope="module")
 def compiled(tmp_path_factory):
-    """All rules for all numbers of arguments that carry derivatives."""
+    """Compile all rules, for all combinations of arguments that carry derivatives.
+
+    Returns:
+        Library, and kernels by name.
+    """
     kernels = [write_function(*case) for case in CASES]
     text = write_library({kernel.__name__: (kernel, DIRECTIONS) for kernel in kernels})
     return compile_text(tmp_path_factory.mktemp("rules"), text), {
@@ -81,7 +90,13 @@ def compiled(tmp_path_factory):
 
 
 def evaluate(library, name, numbers):
-    """Return the value of a kernel for numbers and their derivatives, and its derivatives."""
+    """Return value and derivatives of a kernel.
+
+    Args:
+        library: loaded library.
+        name: name of the kernel.
+        numbers: value and derivatives of each argument.
+    """
     size = 1 + DIRECTIONS
     x = (ctypes.c_double * (size * len(numbers)))(
         *itertools.chain.from_iterable((v, *c) for v, c in numbers)
@@ -121,8 +136,7 @@ def test_each_rule_is_that_of_python(compiled, case):
         result = evaluate(library, name, numbers)
         assert are_same_bits(result[0], expected.value), (values, result, expected.value)
         if function is operator.truediv:
-            # Machine code divides the sum of both terms, and Python each term, which may be too
-            # large then.
+            # C++ divides the sum of both terms; Python divides each term, which may overflow then.
             if not all(map(math.isfinite, expected.slopes)):
                 continue
             assert result[1:] == pytest.approx(expected.slopes, rel=4e-16, abs=0.0, nan_ok=True), (
@@ -135,7 +149,7 @@ def test_each_rule_is_that_of_python(compiled, case):
 
 
 def corners(s: Ints, x: Floats, out: Floats, count: int) -> int:
-    """What takes the value, and where functions have corners."""
+    """Use branches that depend on values, and functions at their corners."""
     a, b = x[0], x[1]
     out[0] = abs(a)
     out[1] = copysign(a, b)

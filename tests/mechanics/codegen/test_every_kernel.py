@@ -1,4 +1,4 @@
-"""All kernels of osimlite as C++: by every compiler and at every level the same bits, and no undefined behaviour."""
+"""Tests of all kernels as C++: equal bits from every compiler and optimization level, and no undefined behaviour."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ pytestmark = [pytest.mark.full, pytest.mark.timeout(3600)]
 
 STRICT = "-fno-fast-math", "-fno-math-errno", "-fno-trapping-math", "-fno-tree-slp-vectorize", "-w"
 CALLS = 100
-"""Calls of each function of numbers."""
+"""Number of calls of each pure function."""
 MOTIONS, TANGENTS = 40, 20
-"""Models, without those of the shared folder, whose motions and whose derivatives are compared."""
+"""Numbers of models, without those of the shared folder, whose motions and whose derivatives are compared."""
 
 
 def compilers():
@@ -43,18 +43,18 @@ def compilers():
 
 @pytest.fixture(scope="module")
 def wrapped():
-    """The kernels that call functions of numbers, by these."""
+    """Return the kernels that call pure functions, by function."""
     return pure_functions.wrap_functions()
 
 
 @pytest.fixture(scope="module")
 def text(wrapped):
-    """All of these kernels as C++."""
+    """Translate all of these kernels to C++."""
     return write_library({kernel.__name__: (kernel, 0) for kernel in wrapped.values()})
 
 
 def raise_by_products(base, exponent):
-    """Return a power as compiled code takes it: by products if the exponent is an integer."""
+    """Compute a power as compiled code does: by products if the exponent is an integer."""
     if not isinstance(base, float) or not isinstance(exponent, int) or abs(exponent) > 0x10000:
         return base**exponent
     result, rest = 1.0, abs(exponent)
@@ -67,7 +67,7 @@ def raise_by_products(base, exponent):
 
 
 class PowersAsCalls(ast.NodeTransformer):
-    """Replaces powers by calls of `raise_by_products`."""
+    """Transformer of syntax trees that replaces powers by calls of `raise_by_products`."""
 
     changed = False
 
@@ -82,10 +82,10 @@ class PowersAsCalls(ast.NodeTransformer):
 
 @pytest.fixture
 def powers_by_products(wrapped, monkeypatch):
-    """Have the functions, as Python, take integer powers by products.
+    """Make the functions compute integer powers by products when they run as Python.
 
-    Python rounds such a power once, compiled code after each product. An iterative search makes more
-    of the last bit than any tolerance allows.
+    Python rounds such a power once, compiled code after each product. Iterative searches amplify this difference in the
+    last bit beyond any tolerance.
     """
     functions = {part for function in wrapped for part in collect_functions(function)}
     for function in functions:
@@ -144,7 +144,12 @@ SANITIZERS = {
 
 
 def environment(compiler, name):
-    """Return the variables with which a process can load a library that was built with a sanitizer."""
+    """Return environment variables with which a process can load a library that was built with a sanitizer.
+
+    Args:
+        compiler: command of the compiler.
+        name: "undefined" or "address".
+    """
     library = {"undefined": "libubsan.so", "address": "libasan.so"}[name]
     path = subprocess.run(
         [compiler, f"-print-file-name={library}"], capture_output=True, text=True, check=True
@@ -159,7 +164,7 @@ def environment(compiler, name):
 
 
 def run_module(module, *arguments, env=None):
-    """Run a module of these tests in a process of its own, and return what it prints."""
+    """Run a module of these tests in a separate process, and return its output."""
     command = [sys.executable, "-m", module, *map(str, arguments)]
     result = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, env=env)
     assert result.returncode == 0, result.stderr[-3000:]
@@ -185,7 +190,11 @@ def test_functions_have_no_undefined_behaviour(wrapped, text, tmp_path, name):
 # ---------------------------------------------------------------------------------------------- whole models
 @pytest.fixture(scope="module")
 def kernels(tmp_path_factory):
-    """The text of all kernels, for floats and for numbers with derivatives, and their symbols by name."""
+    """Translate all kernels, for floats and for numbers with derivatives.
+
+    Returns:
+        C++ text, and symbols by name.
+    """
     names = [*list_library_laws(0), *list_library_laws(16)]
     text = write_library(pure_functions.all_kernels(0) | pure_functions.all_kernels(16))
     return text, {name: get_symbol(name) for name in names}
@@ -210,7 +219,7 @@ def test_motions_and_tangents_are_the_same_bits(kernels, tmp_path):
                 run_module(motions.__name__, library, MOTIONS, TANGENTS)
             )
     first, *others = results.values()
-    # All of these models are in every clone: none may be left out for whatever reason.
+    # All of these models exist in every clone: none may be left out.
     assert [*first["motions"]][:MOTIONS] == [*motions.list_models()][:MOTIONS]
     assert [*first["tangents"]][:TANGENTS] == [*motions.list_models()][:TANGENTS]
     assert all(other == first for other in others), results
@@ -220,7 +229,7 @@ def test_motions_and_tangents_are_the_same_bits(kernels, tmp_path):
 def test_motions_are_those_of_numba(kernels, tmp_path):
     pytest.importorskip("numba", reason="needs numba (extra 'jit')")
     library = build_kernels(kernels, tmp_path, compilers()[0], "-O2")
-    # Numba has no derivatives of kernels.
+    # With numba, kernels have no derivatives.
     compiled = json.loads(run_module(motions.__name__, library, MOTIONS, 0))["motions"]
     variables = {"OSIMLITE_KERNELS": "numba", "NUMBA_CACHE_DIR": str(tmp_path)}
     by_numba = run_module(motions.__name__, "-", MOTIONS, 0, env={**os.environ, **variables})

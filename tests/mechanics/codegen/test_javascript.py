@@ -1,4 +1,4 @@
-"""Functions as JavaScript do what they do in Python."""
+"""Tests of the translation of kernels to JavaScript: results equal those of Python."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ TABLE = 3, 4
 
 
 def branches(a: float, b: float) -> float:
-    """Every kind of expression."""
+    """Use every kind of expression."""
     low, high = (a, b) if a <= b else (b, a)
     if not 0.0 < low < 10.0 or high == 7.0:
         return -low // 2 + low % 0.75 + 4.0 % -high + (high - 1.0) ** 2 / TABLE[1]
@@ -35,7 +35,7 @@ def branches(a: float, b: float) -> float:
 
 
 def loops(count: int, start: float) -> float:
-    """Every kind of loop, one of which changes its own variable."""
+    """Use every kind of loop; one loop changes its own variable."""
     total = start
     for k in range(count):
         k = 2 * k
@@ -55,13 +55,13 @@ def loops(count: int, start: float) -> float:
 
 
 def spread(new: float, case: float) -> float:
-    """Names that JavaScript keeps for itself."""
+    """Use names that are reserved in JavaScript."""
     var = new - case
     return var
 
 
 def pointers(v: np.ndarray, count: int) -> float:
-    """Places in vectors."""
+    """Use offsets in vectors."""
     numbers = at(v, 1)
     numbers[count], numbers[0] = numbers[0] + 7.0, numbers[count]
     numbers[1] -= 1.5
@@ -91,23 +91,23 @@ def test_functions_give_the_same(page):
 
 
 def opens(a: float) -> float:
-    """A statement that no kernel has."""
+    """Use a statement that kernels may not contain."""
     with open("x"):
         return a
 
 
 def asks(a: float) -> float:
-    """A function of Python's library that neither JavaScript nor the runtime has."""
+    """Call a function that neither JavaScript nor the runtime provides."""
     return math.lgamma(a)
 
 
 def masks(a: int) -> int:
-    """Bits that JavaScript takes for a sign."""
+    """Use bits that JavaScript takes for a sign."""
     return a & 0xFFFFFFFF
 
 
 def shares(a: int) -> int:
-    """A function that is called with a keyword."""
+    """Call a function with a keyword."""
     return max(a, 1, key=abs)
 
 
@@ -123,7 +123,7 @@ def test_what_is_not_known_is_an_error(function):
 
 
 def test_all_kernels_are_translated_but_those_with_random_numbers():
-    """Noise of reflexes is of integers of 64 bits."""
+    """Random noise of reflexes needs integers of 64 bits, which the translator refuses."""
     kernels = [*LAW_MODULES, *(kind.name for kind in FORCE_TYPES if isinstance(kind, ForceType))]
     translated = []
     for name in kernels:
@@ -136,7 +136,7 @@ def test_all_kernels_are_translated_but_those_with_random_numbers():
 
 @pytest.fixture(scope="module")
 def results():
-    """By name, the results of the functions of the module `constructs` for all inputs."""
+    """Return the results of the functions of the module `constructs` for all inputs, by name."""
     from tests.mechanics.codegen.node import NODE, call_javascript
 
     if NODE is None:
@@ -148,7 +148,7 @@ def results():
 
 
 def without_signs_of_zero(result):
-    """Return a result in which zeros are positive: in JavaScript, integers have negative zeros too."""
+    """Return a result without negative zeros, which integers of JavaScript can have."""
     return [x + 0 if not isinstance(x, list) else without_signs_of_zero(x) for x in result]
 
 

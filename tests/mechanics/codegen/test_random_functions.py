@@ -1,4 +1,4 @@
-"""Random functions of the restricted Python give the same bits as Python, C++ and JavaScript."""
+"""Tests of translation by random functions: Python, C++ and JavaScript give the same bits."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ INPUTS = 12
 
 @pytest.fixture(scope="module")
 def cases():
-    """For each function, the inputs with which Python raises no error, and its results."""
+    """Return, by function, the inputs for which Python raises no error, and the results."""
     found = {}
     for seed in SEEDS:
         function, results = make_function(seed), []
@@ -33,13 +33,13 @@ def cases():
             except (ArithmeticError, ValueError):
                 continue
         found[function] = results
-    # Most functions can be called with most inputs, or nothing would be compared.
+    # If Python raised an error for most inputs, nothing would be compared.
     assert sum(map(len, found.values())) > 0.9 * INPUTS * len(SEEDS)
     return found
 
 
 def test_functions_differ(cases):
-    """Functions depend on what they are given, and store results."""
+    """Most functions depend on their inputs."""
     varied = [
         results
         for results in cases.values()
@@ -75,5 +75,5 @@ def test_javascript_gives_the_same_numbers(cases):
 
 
 def ignore_sign_of_zero(result):
-    """Return a result whose zeros are positive: an integer zero of JavaScript may be negative."""
+    """Return a result without negative zeros, which integers of JavaScript can have."""
     return [ignore_sign_of_zero(x) if isinstance(x, list) else x + 0 for x in result]

@@ -1,4 +1,8 @@
-"""When a law is compiled anew: when it, or what it calls, or a number that it uses has changed; not for words."""
+"""Tests of the digest that decides when a law is compiled anew.
+
+A law is compiled anew when its code, a function that it calls, or a number that it uses changes, but not for comments
+and layout.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +25,7 @@ def digests():
 
 @pytest.fixture
 def changed(monkeypatch):
-    """Names of the laws whose digest an edit changes."""
+    """Yield a function that edits a module and returns the names of the laws whose digest changes."""
     before = digests()
 
     def edit(module, name, value):
@@ -34,7 +38,7 @@ def changed(monkeypatch):
 
 
 def edited(function, old, new):
-    """A function whose text is another at one place."""
+    """Return a copy of a function with one replacement in its text."""
     text = dedent(inspect.getsource(function))
     assert old in text
     text, file = text.replace(old, new), f"<edited {new}>"
@@ -49,7 +53,7 @@ def edited(function, old, new):
 def test_an_edited_function_concerns_those_that_call_it(changed):
     reflect = linear_algebra.apply_reflection
     result = changed(linear_algebra, "apply_reflection", edited(reflect, "0.0", "0.5"))
-    # `project` solves by the addresses of these laws.
+    # The function `project` calls these laws by address.
     paths = {"cable_path", "geodesic_path"}
     searches = {"fit_frames", "assemble_poses"}
     assert result == {

@@ -1,4 +1,4 @@
-"""Several contacts of one HuntCrossleyForce, surface by surface: what the kernels are compared with."""
+"""Reference for several contacts of one HuntCrossleyForce, surface by surface, with which kernels are compared."""
 
 from __future__ import annotations
 
@@ -10,24 +10,25 @@ from osimlite.mechanics.laws.hunt_crossley import contact_energy, contact_force
 Contact = tuple[
     float, float, float, float, float, float, float, float, float, float, float, float, float
 ]
-"""d, R, k, c, us, ud, uv, and the numbers of n and v: the arguments of `contact_force` but for vt."""
+"""Contact as d, R, k, c, us, ud, uv, n (3) and v (3): the arguments of `contact_force` except vt."""
 
 
 def contact_forces(
     contacts: Iterable[Contact], vt: float, simbody_early_return: bool = False
 ) -> tuple[list[tuple[float, float, float]], float]:
-    """All contacts of one HuntCrossleyForce: the force on surface 2 of each, and their potential energy.
+    """Compute the forces and the energy of all contacts of one HuntCrossleyForce.
 
-    Each contact is on its own, unless Simbody's defect is asked for: there the first contact that
-    separates too fast to push ends the work on this HuntCrossleyForce, and the contacts after it
-    lose their force and their energy.
+    Contacts do not influence each other, unless Simbody's defect is reproduced. There, the first contact that separates
+    too fast to push ends the computation of this HuntCrossleyForce: the contacts after it lose their force and their
+    energy.
 
-    Args: contacts: one tuple per contact, in the order of `simbody_pair_order` (the order matters
-        to the defect only). vt: transition velocity of the HuntCrossleyForce, m/s.
-        simbody_early_return: reproduce the defect, to compare with OpenSim.
+    Args:
+        contacts: one tuple per contact, in the order of `simbody_pair_order`, which matters for the defect only.
+        vt: transition velocity of the HuntCrossleyForce (m/s).
+        simbody_early_return: reproduce the defect, for comparisons with OpenSim.
 
     Returns:
-        One (fx, fy, fz) in N for each contact, in the same order, and the energy in J.
+        Force on surface 2 (N) of each contact, in the same order, and the potential energy (J).
     """
     forces = []
     energy = 0.0
@@ -46,19 +47,19 @@ def contact_forces(
 def simbody_pair_order(
     centres: Sequence[tuple[float, float, float]], radii: Sequence[float]
 ) -> list[tuple[int, int]]:
-    """Pairs of surfaces of one HuntCrossleyForce that may touch, in the order in which Simbody works on them.
+    """Return pairs of surfaces of one HuntCrossleyForce that may touch, in the order in which Simbody treats them.
 
-    Simbody sweeps along the axis of ground on which the centres lie farthest apart (largest sum of
-    distances from their mean), starting from the surface that begins first, and drops pairs whose
-    bounding spheres are apart. Pairs on the same body are among them: their force has no effect,
-    but OpenSim counts their energy.
+    Simbody sweeps along the axis of ground on which the centres lie farthest apart (largest sum of distances from their
+    mean), starting from the surface that begins first, and drops pairs whose bounding spheres are apart. Pairs on the
+    same body are included: their force has no effect, but OpenSim counts their energy.
 
-    Args: centres: centre of each surface in ground, m, in the order in which the file lists them;
-        of a half space the origin of its frame. radii: radius of each sphere, m; `inf` marks a half
-        space.
+    Args:
+        centres: centre of each surface in ground (m), in the order of the file; the origin of its frame for a half
+            space.
+        radii: radius of each sphere (m); `inf` for a half space.
 
-    Returns: Pairs (surface 1, surface 2) of indices; a half space is always surface 1. Two half
-        spaces make no pair.
+    Returns:
+        Pairs (surface 1, surface 2) of indices. A half space is always surface 1, and two half spaces make no pair.
     """
     n = len(centres)
     spread = []

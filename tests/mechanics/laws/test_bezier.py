@@ -1,4 +1,4 @@
-"""The curves of Millard's muscles against OpenSim's numbers, and what they are between these."""
+"""Tests of the curves of Millard's muscles against OpenSim's values, slopes and integrals."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ def test_values_slopes_and_integrals(fixtures):
             if result["dy"]:
                 assert slope == pytest.approx(result["dy"][index], rel=1e-11, abs=1e-11)
             if result["integral"]:
-                # OpenSim's is a spline, worst beside the ends; that of compression counts from the
-                # other end.
+                # OpenSim's integral is a spline, least accurate near the ends; for compression it starts at the other
+                # end.
                 own = curve_integral(numbers, x)
                 own = whole - own if "Compressive" in result["curve"] else own
                 assert own == pytest.approx(result["integral"][index], abs=2e-5)
@@ -52,7 +52,7 @@ share = st.floats(0.0, 1.0)
 
 @given(share, share, share, share, share)
 def test_the_inverse_is_one(near, more, isometric, one, other):
-    """For any curve, and as exactly as its steepness lets it be."""
+    """The inverse curve undoes the curve, as precisely as its slope permits."""
     numbers = (
         0.1 + 0.4 * near,
         0.11 + 0.8 * more,
@@ -124,7 +124,7 @@ def test_what_makes_no_curve(make, words):
 
 
 def test_slopes_that_meet_beside_their_section_make_no_curve() -> None:
-    # OpenSim 4.6 refuses this curve: x falls at first, and cannot be inverted.
+    # OpenSim 4.6 refuses this curve: x decreases at first, so that it cannot be inverted.
     with pytest.raises(ValueError, match="meet beside"):
         muscle_curves.active_force_length(
             0.7128559333577094, 0.9806258776360097, 4.995436, 2.3516971896065857, 0.0

@@ -44,7 +44,7 @@ def test_angles_where_two_axes_are_one(b, a, c):
 
 @given(TURNS, TILTS, TURNS, st.tuples(TURNS, TURNS, TURNS))
 def test_rates_and_moment(a, b, c, rates):
-    """Rates against a difference of rotations; moment and rates are of one power."""
+    """Compare rates with differences of rotations; moments and rates have the same power."""
     h = 1e-6
     before, after = (
         rotation(*(np.array((a, b, c)) + sign * h * np.array(rates))) for sign in (-1.0, 1.0)

@@ -1,4 +1,4 @@
-"""The coordinate limit force against OpenSim's table, and its properties."""
+"""Tests of the coordinate limit force against a table from OpenSim, and of its properties."""
 
 from __future__ import annotations
 
@@ -28,11 +28,10 @@ PROPERTIES = (
 
 
 def test_every_row_of_opensims_table(fixtures):
-    """Force to 1e-9 of the sum of the magnitudes of its terms (springs, damper), energy to 1e-9 of itself.
+    """Compare forces to 1e-9 of the sum of the magnitudes of their terms (springs, damper), and energies to 1e-9.
 
-    That sum is the force itself where the terms do not cancel; in four rows they cancel to
-    rounding. OpenSim forms one step as a difference, which costs digits next to the limit
-    (1.6e-10); the rest agrees to 1e-12.
+    That sum is the force itself unless the terms cancel; in four rows they cancel to rounding. OpenSim computes one
+    step function as a difference, which loses digits next to the limit (1.6e-10); the rest agrees to 1e-12.
     """
     with gzip.open(fixtures / "forces" / "coordinate_limit_table.csv.gz", "rt") as text:
         rows = list(csv.DictReader(line for line in text if not line.startswith("#")))
@@ -65,7 +64,7 @@ zone = st.floats(1e-3, 1.0)
 
 @st.composite
 def laws(draw):
-    """Ku, qu, Kl, ql, D, t with the limits in order."""
+    """Draw Ku, qu, Kl, ql, D, t with the limits in order."""
     low, high = sorted((draw(angle), draw(angle)))
     return draw(stiffness), high, draw(stiffness), low, draw(damping), draw(zone)
 
@@ -85,7 +84,7 @@ def test_spring_is_minus_the_slope_of_the_energy(law, q):
     slope = (limit_energy(q + h, Ku, qu, Kl, ql, t) - limit_energy(q - h, Ku, qu, Kl, ql, t)) / (
         2 * h
     )
-    # The third derivative of the energy is at most of the order K / t within the zone.
+    # In the transition zone, the third derivative of the energy is at most of the order of K / t.
     assert limit_force(q, 0.0, *law) == pytest.approx(
         -slope, rel=1e-6, abs=10 * (Ku + Kl) * h * h / t + 1e-6
     )
@@ -93,7 +92,7 @@ def test_spring_is_minus_the_slope_of_the_energy(law, q):
 
 @given(laws(), angle, speed)
 def test_damper_takes_power_and_is_the_rest_of_the_force(law, q, u):
-    """Beyond a limit it is a share S of D u, which grows from 0 to 1 through the zone."""
+    """Beyond a limit, damping is S D u, where the step S grows from 0 to 1 in the transition zone."""
     _, qu, _, ql, D, t = law
     x = min(max(q - qu, ql - q, 0.0) / t, 1.0)
     share = 10.0 * x**3 - 15.0 * x**4 + 6.0 * x**5
@@ -108,7 +107,7 @@ def test_damper_takes_power_and_is_the_rest_of_the_force(law, q, u):
 
 @given(laws(), angle, speed)
 def test_mirror(law, q, u):
-    """Upper and lower side are images of each other."""
+    """The upper and the lower limit are mirror images."""
     Ku, qu, Kl, ql, D, t = law
     assert limit_force(-q, -u, Kl, -ql, Ku, -qu, D, t) == -limit_force(q, u, *law)
     assert limit_energy(-q, Kl, -ql, Ku, -qu, t) == limit_energy(q, Ku, qu, Kl, ql, t)

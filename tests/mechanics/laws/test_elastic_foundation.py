@@ -26,25 +26,25 @@ def test_nearest_points():
     depth, point = spring_in_sphere(center, 2.0, (1.0, 0.5, 0.0))
     assert (depth, *point) == pytest.approx((1.5, 1.0, 2.0, 0.0))
     assert spring_in_sphere(center, 2.0, (1.0, 2.5, 0.0))[0] == pytest.approx(-0.5)
-    # In the centre no way out is shortest.
+    # At the centre no direction to the surface is shortest.
     assert spring_in_sphere(center, 2.0, center)[0] == 0.0
 
 
 def force(d, v, material=MATERIAL):
-    """Force and energy where the middle is the origin and everything is about the nearest point."""
+    """Return force and energy of a spring, with the origin as mesh centre and as reference point of torques."""
     pushed, torque, energy = spring_load(FoundationSpring(*material), ZERO, d, d, v, ZERO)
     assert torque == ZERO
     return pushed, energy
 
 
 def test_force_by_hand():
-    # 100 N/m, 0.1 m deep, nearing at 0.2 m/s, slipping at the transition velocity: mu = us + uv w.
+    # 100 N/m, 0.1 m deep, approach at 0.2 m/s, slip at the transition velocity: mu = us + uv w.
     f, deep = 100.0 * 0.1 * (1.0 + 0.5 * 0.2), (0.0, 0.1, 0.0)
     slipping, energy = force(deep, (0.2, 0.2, 0.0))
     assert slipping == pytest.approx((f * (0.8 + 0.1 * 0.2), f, 0.0))
     assert energy == pytest.approx(0.5)
     assert force(deep, (0.0, 0.2, 0.0))[0] == pytest.approx((0.0, f, 0.0))
-    # It does not pull, nor rub, when it leaves quickly; nor without depth.
+    # The spring neither pulls nor rubs when it separates quickly, nor without penetration.
     assert force(deep, (0.2, -2.0, 0.0)) == ((0.0, 0.0, 0.0), energy)
     assert force((0.0, 0.0, 0.0), (0.2, 2.0, 0.0)) == ((0.0, 0.0, 0.0), 0.0)
 

@@ -30,7 +30,7 @@ def test_three_equal_axes_make_a_sphere(plane, center, seed, r, a):
 
 @given(st.integers(0, 99), st.tuples(*[st.floats(0.2, 2.0)] * 3))
 def test_depth_and_point_against_a_search(seed, radii):
-    """With the whole depth the half space's, the point is the deepest of the surface."""
+    """If the half space takes all of the deformation, the contact point is the deepest point of the ellipsoid."""
     axes, normal = turned(seed), turned(seed + 100)[0]
     place = 1.0, 2.0, 3.0
     d, _, point = half_space_ellipsoid(place, normal, place, axes.T, radii, 1.0)
@@ -49,7 +49,7 @@ POSITIVE = st.floats(0.2, 2.0)
 
 @given(POSITIVE, POSITIVE, *[st.floats(-1.0, 1.0)] * 3, st.floats(0.0, 1.0))
 def test_two_round_ellipsoids_are_spheres(r1, r2, x, y, z, a):
-    # Squares of such numbers have few digits.
+    # Squares of smaller numbers underflow.
     assume(max(map(abs, (x, y, z))) > 1e-140)
     sphere = sphere_sphere(ZERO, r1, (x, y, z), r2, a)
     result = ellipsoid_ellipsoid(ZERO, IDENTITY, (r1, r1, r1), (x, y, z), IDENTITY, (r2, r2, r2), a)
@@ -61,7 +61,7 @@ def test_two_round_ellipsoids_are_spheres(r1, r2, x, y, z, a):
 
 
 def test_ellipsoids_end_to_end():
-    """Of half axes 2, 1, 1 and 1, 3, 1, along their X axes: curvatures there are 2, 2 and 1/9, 1."""
+    """Half axes are 2, 1, 1 and 1, 3, 1, and the X axes are aligned: curvatures there are 2, 2 and 1/9, 1."""
     d, R, n, point = ellipsoid_ellipsoid(
         ZERO, IDENTITY, (2.0, 1.0, 1.0), (2.9, 0.0, 0.0), IDENTITY, (1.0, 3.0, 1.0), 0.25
     )

@@ -1,4 +1,4 @@
-"""What formulas are made of, where Python's own functions would raise."""
+"""Tests of functions in formulas, which return C's values where Python's own functions would raise an error."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Hunt-Crossley contact against OpenSim's tables, and the properties that any such law must have."""
+"""Tests of Hunt-Crossley contact against OpenSim's tables, and of properties that any such law must have."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from tests.mechanics.laws.contact_sets import contact_forces, simbody_pair_order
 
 
 def body_fixed_xyz(angles):
-    """Rotation matrix Rx Ry Rz."""
+    """Return the rotation matrix Rx Ry Rz of three angles (rad)."""
     (cx, cy, cz), (sx, sy, sz) = np.cos(angles), np.sin(angles)
     x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
     y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
@@ -38,7 +38,11 @@ def body_fixed_xyz(angles):
 
 
 def evaluate(row):
-    """Force and moment about the body origins of both bodies (F2, M2, F1, M1) and energy of a row's pose."""
+    """Evaluate the pose of a row of the table.
+
+    Returns:
+        Forces and moments about the body origins (F2, M2, F1, M1), and the energy.
+    """
 
     def vector(prefix, names="xyz"):
         return np.array([row[prefix + name] for name in names])
@@ -71,7 +75,9 @@ def table(fixtures):
 
 
 def test_table_forces_and_energies(table):
-    """Force and moment relative to the largest component of the row's vector, energy relative to itself."""
+    """Errors of forces and moments are relative to the largest component of the vector, those of energies to the
+    energy.
+    """
     assert len(table) == 2232
     touching = 0
     for row in table:
@@ -97,7 +103,16 @@ MATERIAL = 1e6, 1.0, 0.8, 0.4, 0.4
 
 
 def plane_contacts(positions, separating, names):
-    """Contacts of spheres 1 cm deep in the plane y = 0, in Simbody's order; some of them leave at 1 m/s."""
+    """Return contacts of spheres 1 cm deep in the plane y = 0, some of which separate at 1 m/s.
+
+    Args:
+        positions: x of each sphere (m).
+        separating: whether each sphere separates.
+        names: name of each sphere.
+
+    Returns:
+        Contacts and names of their spheres, both in Simbody's order.
+    """
     k, a, c, us, ud, uv = combine_materials(*MATERIAL, *MATERIAL)
     centres = [(0.0, 0.0, 0.0), *((x, RADIUS - DEPTH, 0.0) for x in positions)]
     radii = [inf, *(RADIUS for _ in positions)]
@@ -138,7 +153,7 @@ def test_two_spheres_as_simbody_does_it(measured, separating, positions):
 
 @pytest.mark.parametrize(("separating", "positions"), TWO_SPHERES)
 def test_two_spheres_each_on_its_own(measured, separating, positions):
-    """By default each sphere gets what it gets alone (case vA=0 vB=0), whatever the other one does."""
+    """By default each sphere has the force that it has alone (case vA=0 vB=0), whatever the other one does."""
     alone = next(x for x in measured if x["case"] == "one_force_two_spheres")
     contacts, order = plane_contacts([float(x) for x in positions], separating, "AB")
     forces, energy = contact_forces(contacts, 0.2)
@@ -164,7 +179,7 @@ def test_spheres_of_one_force_touch_each_other(measured):
 
 
 def test_no_friction_transition(measured):
-    """Transition velocity 0: the friction of every slip is dynamic and viscous."""
+    """With a transition velocity of 0, friction is dynamic and viscous at any slip velocity."""
     values, energy = measured_case(measured, "zero_vt")
     k, a, c, us, ud, uv = combine_materials(*MATERIAL, *MATERIAL)
     d, (px, py, _) = half_space_sphere(ZERO, UP, (0.0, 0.04, 0.0), 0.05, a)
@@ -198,7 +213,7 @@ def test_no_radius_or_no_stiffness_no_force(measured, name):
 
 
 def test_no_stiffness_on_both_sides_is_no_force():
-    """OpenSim gives NaN here; a surface without stiffness cannot push."""
+    """OpenSim computes NaN here, but a surface without stiffness cannot push."""
     k, a, *rest = combine_materials(0.0, *MATERIAL[1:], 0.0, *MATERIAL[1:])
     assert (k, a) == (0.0, 0.5)
     assert contact_force(0.01, 0.05, k, *rest, 0.2, UP, (0.3, 0.1, 0.0)) == ZERO
@@ -217,7 +232,7 @@ def test_concentric_spheres_do_not_touch(measured):
 
 
 def test_a_contact_without_depth_does_not_end_simbodys_loop():
-    """Only what Simbody lists as a contact can return early: spheres apart from the plane are not listed."""
+    """Only what Simbody lists as a contact can return early, and a sphere above the plane is not listed."""
     apart = (-0.01, 0.05, 5e3, 1.0, 0.8, 0.4, 0.4, 0.0, 1.0, 0.0, 0.0, -1.0, 0.0)
     pushing = (0.01, *apart[1:-2], 0.0, 0.0)
     both = contact_forces([apart, pushing], 0.2)
@@ -298,8 +313,8 @@ def test_surfaces_push_and_friction_opposes_slip(contact, vt):
     friction = [a - f * b for a, b in zip(force, n, strict=True)]
     w = math.hypot(*slip)
     us, ud, uv = contact[4:7]
-    if 2.0 * us >= ud:  # else the curve itself turns negative below the transition velocity
-        # Surface 1 drags surface 2 along with its slip.
+    if 2.0 * us >= ud:  # else the friction curve is negative below the transition velocity
+        # Surface 1 drags surface 2 along in the direction of its slip.
         assert dot(friction, slip) >= -1e-9 * scale * (1.0 + w)
     bound = ud + 2.0 * abs(us - ud) + uv * w
     assert math.hypot(*friction) <= f * bound * (1 + 1e-9) + 1e-9 * scale
@@ -307,7 +322,7 @@ def test_surfaces_push_and_friction_opposes_slip(contact, vt):
 
 @given(contacts(), slip_scale)
 def test_power_is_lost_and_never_made(contact, vt):
-    """What the bodies give is more than what the elastic force of Hertz stores."""
+    """The power that the contact takes from the bodies is at least what the elastic Hertz force stores."""
     force = law(contact, vt)
     d, R, k = contact[:3]
     n, v = contact[7:10], contact[10:13]
@@ -315,7 +330,7 @@ def test_power_is_lost_and_never_made(contact, vt):
     elastic = k * d * sqrt(R * k * d)
     power = dot(force, v) - 4.0 / 3.0 * elastic * dot(v, n)
     scale = abs(dot(force, v)) + elastic * math.hypot(*v)
-    # A slip that is but the rounding of v counts as v / vt roundings in the friction.
+    # If the slip is only a rounding error of v, friction has v / vt times the relative rounding error.
     assert power >= -1e-10 * scale
 
 
@@ -382,7 +397,7 @@ def test_energy_derivative_is_the_elastic_force(d, R, k):
 
 @given(contacts(), slip_scale, st.floats(-math.pi, math.pi))
 def test_the_law_knows_no_frame(contact, vt, angle):
-    """Turning normal and velocity turns the force."""
+    """Rotating normal and velocity rotates the force."""
     cos, sin = math.cos(angle), math.sin(angle)
 
     def turn(v):
@@ -400,8 +415,8 @@ def test_the_law_knows_no_frame(contact, vt, angle):
 def test_point_of_application_divides_the_overlap(o, n, c, r, a):
     d, P = half_space_sphere(o, n, c, r, a)
     if d > 0.0:
-        # a of the depth lies on the half space's side of the point, the rest between the point and
-        # the sphere's pole.
+        # The fraction a of the depth is on the half space's side of the point, the rest between it and the sphere's
+        # pole.
         assert dot([p - q for p, q in zip(P, o, strict=True)], n) == pytest.approx(-a * d, abs=1e-9)
         pole = [x - r * y for x, y in zip(c, n, strict=True)]
         assert math.dist(P, pole) == pytest.approx((1 - a) * d, abs=1e-9)

@@ -1,4 +1,4 @@
-"""What makes the laws fit to be interpreted and compiled from the same source."""
+"""Tests that laws can be interpreted and compiled from the same source."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def is_of_forces(value):
 
 
 def globals_of(function):
-    """What a function names that is not built in."""
+    """Return the objects that a function uses by name, except built-in ones."""
     names = {
         item.argval for item in dis.get_instructions(function) if item.opname == "LOAD_GLOBAL"
     } - BUILT_IN
@@ -35,7 +35,7 @@ def globals_of(function):
 
 
 def laws():
-    """The functions of the package that kernels and kinds of forces call; the rest prepares numbers or reports."""
+    """Return the functions that kernels and force types call; other functions prepare numbers or report errors."""
     modules = [
         import_module(f"{kernels.__name__}.{item.name}") for item in iter_modules(kernels.__path__)
     ]
@@ -52,8 +52,8 @@ def laws():
         function = pending.pop()
         if function not in result:
             result.add(function)
-            # Names of attributes are among these, and no function is called like one; to read the
-            # instructions of all kernels takes a hundred times as long.
+            # Names of attributes are among these, but no function has such a name; disassembling all kernels takes a
+            # hundred times as long.
             pending += [
                 value
                 for value in map(function.__globals__.get, function.__code__.co_names)
@@ -71,7 +71,7 @@ def test_all_laws_are_here():
 
 @of_each(LAWS, lambda law: f"{law.__module__}.{law.__name__}")
 def test_stands_alone(law):
-    """A function that closes over nothing, and that calls none but laws and those of `math`, can be compiled."""
+    """A function without closure that calls only laws and functions of `math` can be compiled."""
     for name, value in globals_of(law).items():
         assert (
             is_of_forces(value)
@@ -83,7 +83,7 @@ def test_stands_alone(law):
 
 @of_each(LAWS, lambda law: f"{law.__module__}.{law.__name__}")
 def test_takes_and_gives_scalars(law):
-    """And triples, tables of numbers, and named tuples of scalars or of tables."""
+    """Types are scalars, triples, tables of numbers, and named tuples of scalars or of tables."""
     named = {
         name: value
         for name, value in law.__globals__.items()

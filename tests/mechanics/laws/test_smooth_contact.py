@@ -19,7 +19,7 @@ from osimlite.mechanics.laws.smooth_contact import (
 
 UP = 0.0, 1.0, 0.0
 SHARP = 1e-18, 1e7
-"""cf and bd or bv with which the smooth law is nearly that of Hunt and Crossley."""
+"""Parameters cf and bd or bv with which the smooth law is close to that of Hunt and Crossley."""
 
 
 @given(
@@ -88,7 +88,7 @@ STATION_CONSTANTS = 1e4, 0.01, 0.0, 0.5, 0.2, 0.05
 
 def test_station_contact():
     still = station_contact_force(-0.02, 0.0, 0.0, 0.0, *STATION_CONSTANTS)
-    # Nearly a spring of 10 kN/m that sets in at -0.001 m, and a weak one above it.
+    # The force is close to a spring of 10 kN/m that begins at -0.001 m, and to a weak one above it.
     assert still[0] == still[2] == 0.0 and still[1] == pytest.approx(1e4 * 0.019, rel=0.1)
     assert station_contact_force(0.01, 0.0, 0.0, 0.0, *STATION_CONSTANTS)[1] == pytest.approx(
         0.0, abs=1e-6

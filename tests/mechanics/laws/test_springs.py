@@ -39,7 +39,7 @@ def test_elastic_forces_are_slopes_of_the_energies(length, l0):
 
 
 def test_damping_of_a_ligament():
-    """It sets in over the first hundredth of strain, and only while the ligament lengthens."""
+    """Damping increases over the first 0.01 of strain, and acts only while the ligament lengthens."""
     constants = 2.0, 100.0, 0.06, 8.0
     for strain, part in ((-0.1, 0.0), (0.0, 0.0), (0.005, 0.5), (0.01, 1.0), (0.2, 1.0)):
         length = 2.0 * (1.0 + strain)
@@ -54,14 +54,14 @@ def test_values_worked_out_by_hand():
     assert coordinate_spring_force(1.0, 2.0, 3.0, 0.5, 0.25) == -2.0
     assert path_spring_tension(2.0, 0.5, 1.5, 10.0, 0.2) == pytest.approx(5.5)
     assert path_spring_tension(1.4, 0.5, 1.5, 10.0, 0.2) == 0.0
-    # Faster than 1 / d it pushes, as in OpenSim.
+    # If it shortens faster than 1 / d, it pushes, as in OpenSim.
     assert path_spring_tension(2.0, -10.0, 1.5, 10.0, 0.2) == pytest.approx(-5.0)
     assert [path_stretch(1.0, 1.5, clamped) for clamped in (True, False)] == [0.0, -0.5]
     assert blankevoort_tension(2.2, 0.0, 2.0, 100.0, 0.06, 8.0) == pytest.approx(7.0)
 
 
 def test_pneumatic_muscle():
-    # It does not pull at the length B / sqrt(3).
+    # The tension is zero at the length B / sqrt(3).
     assert mckibben_tension(0.1 + 0.6 / 3**0.5, 1e5, 1.5, 0.6, 0.1) == pytest.approx(0.0, abs=1e-9)
     assert mckibben_tension(0.5, 1e5, 1.5, 0.6, 0.1) == pytest.approx(
         1e5 * 0.12 / (9.0 * 3.141592653589793)

@@ -1,4 +1,4 @@
-"""Mechanisms built from the cases in fixtures/kinematics, without any document in between."""
+"""Mechanisms that are built from the cases in fixtures/kinematics without a model file."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ FIXTURES = Path(__file__).parents[3] / "fixtures" / "kinematics"
 
 @cache
 def load(name: str) -> Any:
-    """A JSON fixture, packed or not."""
+    """Read a JSON fixture, compressed or not."""
     packed = FIXTURES / f"{name}.gz"
     if packed.exists():
         return json.loads(gzip.decompress(packed.read_bytes()))
@@ -50,7 +50,7 @@ def load(name: str) -> Any:
 
 
 def function(spec: dict[str, Any]) -> f.SmoothFunction:
-    """The function that a case describes."""
+    """Return the function that a case describes."""
     return convert_function(_component(spec), 1, "the function of a case")
 
 
@@ -66,7 +66,12 @@ def _component(spec: dict[str, Any]) -> schema.Function:
 
 
 def motions(joint_type: str, properties: dict[str, Any]) -> tuple[JointMotion, ...]:
-    """The motions of a joint with the properties that a case gives."""
+    """Return the motions of a joint.
+
+    Args:
+        joint_type: class of the joint.
+        properties: its properties in a case.
+    """
     match joint_type:
         case "EllipsoidJoint":
             return make_ellipsoid_motions(properties["radii_x_y_z"])
@@ -91,9 +96,11 @@ def motions(joint_type: str, properties: dict[str, Any]) -> tuple[JointMotion, .
 
 
 def mechanism_of(case: dict[str, Any], *, turned_round: bool = False) -> Mechanism:
-    """Ground and one body, joined as a case of joint_kinematics_cases.json says; the body is the child.
+    """Build the mechanism of a case of joint_kinematics_cases.json: ground and one body, which is the child.
 
-    With `turned_round` the body is the joint's parent and ground its child.
+    Args:
+        case: the case.
+        turned_round: the body is the joint's parent and ground its child.
     """
     parts = motions(case["joint_type"], case["properties"])
     count = len(case["coordinates"])
@@ -117,7 +124,7 @@ def mechanism_of(case: dict[str, Any], *, turned_round: bool = False) -> Mechani
 
 
 def alone(mobilizer: Mobilizer) -> Mechanism:
-    """Ground and one body that a joint carries."""
+    """Return a mechanism of ground and one body that a joint carries."""
     names = [f"q{k}" for k in mobilizer.coordinates]
     infos = tuple(
         CoordinateInfo(name, f"{mobilizer.joint}/{name}", mobilizer.joint, "coupled")
@@ -130,5 +137,5 @@ def alone(mobilizer: Mobilizer) -> Mechanism:
 
 @cache
 def mixed_tree() -> Mechanism:
-    """The tree of fixtures/kinematics/mixed_joint_tree.osim: 10 bodies, 24 coordinates, 10 joint types."""
+    """Return the tree of fixtures/kinematics/mixed_joint_tree.osim: 10 bodies, 24 coordinates, 10 joint types."""
     return build_mechanism(osimlite.read(FIXTURES / "mixed_joint_tree.osim"))

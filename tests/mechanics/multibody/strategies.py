@@ -1,4 +1,4 @@
-"""Random mechanisms and states for properties that must hold for every tree."""
+"""Hypothesis strategies for random mechanisms and states."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ MOTIONS = {name: make_plain_motions(getattr(osimlite, name)) for name in PLAIN_J
 
 
 KINDS = ("point", "distance", "line", "weld", "rolling", "coupler", "prescribed")
-"""Of constraints."""
+"""Kinds of constraints that `constraint_of` creates."""
 
 JOINT_TYPES = (
     *MOTIONS,
@@ -53,7 +53,7 @@ JOINT_TYPES = (
 
 
 class Case(NamedTuple):
-    """A mechanism of n coordinates with a state and accelerations, each (n,)."""
+    """Mechanism of n coordinates with a state and accelerations, each (n,)."""
 
     mechanism: Mechanism
     q: Array
@@ -62,12 +62,12 @@ class Case(NamedTuple):
 
 
 def _radii(rng: np.random.Generator) -> Array:
-    """Radii of an ellipsoid (3,), m; of a mirrored one they are negative."""
+    """Return random radii of an ellipsoid (3,) in m; negative radii mirror it."""
     return rng.uniform(0.1, 0.4, 3) * rng.choice((-1.0, 1.0))
 
 
 def motions_of(joint_type: str, rng: np.random.Generator) -> tuple[JointMotion, ...]:
-    """The motions of a joint type with random properties."""
+    """Return the motions of a joint type with random properties."""
     if joint_type == "EllipsoidJoint":
         return make_ellipsoid_motions(_radii(rng))
     if joint_type == "ConstantCurvatureJoint":
@@ -91,7 +91,7 @@ def motions_of(joint_type: str, rng: np.random.Generator) -> tuple[JointMotion, 
 
 
 def coordinates_of(motions: tuple[JointMotion, ...]) -> int:
-    """How many coordinates the motions of a joint take."""
+    """Return the number of coordinates of the motions of a joint."""
     return 1 + max((place for motion in motions for place in motion.coordinates), default=-1)
 
 
@@ -130,7 +130,7 @@ def _body(
 
 @st.composite
 def cases(draw: st.DrawFn, *, max_bodies: int = 5) -> Case:
-    """A random tree of random joints, some of them reversed, at a random state."""
+    """Draw a random tree of random joints, some of them reversed, at a random state."""
     count = draw(st.integers(1, max_bodies))
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
     bodies: list[MobileBody] = []
@@ -149,7 +149,7 @@ def cases(draw: st.DrawFn, *, max_bodies: int = 5) -> Case:
 
 
 def constraint_of(kind: str, mechanism: Mechanism, rng: np.random.Generator) -> ConstraintEquations:
-    """A random constraint of a kind."""
+    """Return a random constraint of a kind between two random bodies."""
     one, two = rng.choice(range(-1, len(mechanism.bodies)), 2, replace=False).tolist()
     first, second = (StationPlacement(body, rng.uniform(-0.3, 0.3, 3)) for body in (one, two))
     match kind:

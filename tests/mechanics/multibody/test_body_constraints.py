@@ -17,10 +17,10 @@ from tests.suite import choose
 @settings(max_examples=choose(25, 50))
 @given(cases(), st.sampled_from(KINDS), st.integers(0, 2**32 - 1))
 def test_equations_are_the_derivatives_of_the_errors(case: Case, kind, seed):
-    """Along any motion: the errors change at G u - b, and what binds speeds changes at G udot - b.
+    """Compare constraint equations with differences along any motion.
 
-    Where points are to meet, both as the first body sees it, but for what it does to the rate of
-    the errors; and what speeds change at, as the body sees it that carries both.
+    Position errors change at G u - b, and velocity errors at G udot - d. For coincident points, rates are seen from the
+    first body, and changes of rates from the body that carries both.
     """
     assume(len(case.q))
     mechanism, q, u, udot = case
@@ -79,8 +79,7 @@ def test_assembled_states_fulfil_the_constraints_or_are_refused(case: Case, kind
     assert np.abs(constraint.position_errors(state)).max() < 1e-10
     rows, wanted = constraint.velocity_equations(state)
     free = solve_with_null_space(rows, wanted)[1]
-    # What is kept up costs nothing beyond it: the change of speeds and the forces missing lie in
-    # the rows. A change of a speed above 1 counts relative to it.
+    # Constraints do no other work: changes of speeds (relative above 1) and missing forces lie in the rows of G.
     change = (u - case.u) / np.maximum(np.abs(case.u), 1.0) ** 2
     assert free.T @ change == pytest.approx(
         np.zeros(free.shape[1]), abs=1e-9 * (1.0 + np.abs(u).max())

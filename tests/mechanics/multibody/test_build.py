@@ -145,7 +145,7 @@ def test_frames_on_frames_end_at_the_body():
     outer = PhysicalOffsetFrame(
         name="outer", socket_parent=inner, translation=(0.0, 0.5, 0.0), orientation=(0, 0.2, 0.3)
     )
-    # The outer frame stands first: sockets may look ahead.
+    # The outer frame comes first: sockets may refer to later components.
     body.components.extend([outer, inner])
     base = PhysicalOffsetFrame(name="base", socket_parent=model.ground, translation=(1.0, 0.0, 0.0))
     model.add(base)
@@ -211,7 +211,7 @@ def test_bodies_come_breadth_first_and_coordinates_in_the_order_of_joints():
 
 def test_coordinates_left_out_are_opensims():
     model = Model(name="m")
-    # As a file has it; Model.add would name them after their joint.
+    # This is the state after reading a file; Model.add would name the coordinates after their joint.
     model.joint_set.objects.append(FreeJoint(name="free").between(model.ground, _body(model, "b")))
     coordinates = load("joint_defaults.json")["FreeJoint"]["coordinates"]
     for info, listed in zip(build_mechanism(model).coordinates, coordinates, strict=True):
@@ -242,7 +242,7 @@ def test_a_body_without_mass_has_no_inertia():
 
 
 def test_bodies_without_a_way_to_ground_float():
-    """As in OpenSim 4.6: first bodies without joints, then of each group the body that is no child."""
+    """OpenSim 4.6 adds free joints: first for bodies without joints, then in each group for the body that is no child."""
     model = Model(name="m")
     bodies = {name: _body(model, name) for name in "abcd"}
     model.add(_named(PinJoint(name="j")).between(bodies["b"], bodies["c"]))
@@ -276,7 +276,7 @@ def test_a_frame_is_laid_through_stations():
     frame = model.subcomponents[-1]
     frame.ab_axis, frame.ab_x_ac_axis = "-z", "+y"
     matrix = build_mechanism(model).frames["/laid"].transform
-    # a to b is body y, and frame -z; (b - a) × (c - a) is body x, and frame y.
+    # From a to b is body y, and frame -z; (b - a) × (c - a) is body x, and frame y.
     assert matrix[:3, 2] == pytest.approx((0.0, -1.0, 0.0), abs=1e-15)
     assert matrix[:3, 1] == pytest.approx((1.0, 0.0, 0.0), abs=1e-15)
     assert np.linalg.det(matrix) == pytest.approx(1.0)

@@ -37,8 +37,7 @@ def test_a_locked_coordinate_does_not_accelerate(case: Case, data):
     qddot = mechanism.rate_matrix(q) @ udot + mechanism.rate_bias(q, u)
     scale = 1.0 + np.abs(udot).max()
     assert np.abs(qddot[sorted(places)]).max() < 1e-9 * scale
-    # What holds the coordinates does no work: the forces missing from the equation of motion lie
-    # along the locks.
+    # Locks do no work: the forces missing in the equation of motion lie along the locks.
     missing = mechanism.inverse_dynamics(q, u, udot) - case.udot
     multipliers = np.linalg.lstsq(rows.T, missing, rcond=None)[0]
     assert np.abs(rows.T @ multipliers - missing).max() < 1e-8 * (1.0 + np.abs(missing).max())

@@ -1,4 +1,4 @@
-"""Real models: poses, markers, mass matrices and assembled default poses against OpenSim's, to the digits on record."""
+"""Tests of corpus models against OpenSim: poses, markers, mass matrices and assembled default poses."""
 
 from __future__ import annotations
 
@@ -63,11 +63,11 @@ def test_default_poses_are_assembled_as_in_opensim(corpus_model):
 
 
 def test_real_models_keep_their_energy(corpus_model):
-    """Along the motion that the accelerations make, power is zero: what drives the bodies is gravity alone."""
+    """Along the motion, total energy is constant, because gravity is the only force."""
     mechanism, _ = _mechanism_and_truth(corpus_model)
     rng = np.random.default_rng(4)
     q, _ = mechanism.default_state()
-    # Away from the ends of ranges, where splines often end and their second derivatives jump.
+    # Avoid the ends of ranges, where splines often end and their second derivatives jump.
     middles = np.array([sum(info.range) / 2.0 for info in mechanism.coordinates])
     moved = [0.0 if info.locked else rng.uniform(0.02, 0.1) for info in mechanism.coordinates]
     q = mechanism.assemble(q + np.sign(middles - q) * moved)
@@ -85,7 +85,7 @@ def test_real_models_keep_their_energy(corpus_model):
         return mechanism.kinetic_energy(there, u + udot * t) + mechanism.potential_energy(there)
 
     step = 1e-4
-    # A central difference of fourth order.
+    # Central difference of fourth order.
     near, far = (energies(size * step) - energies(-size * step) for size in (1.0, 2.0))
     power = (8.0 * near - far) / (12.0 * step)
     scale = mechanism.kinetic_energy(q, u) + abs(mechanism.gravity_forces(q) @ u)

@@ -1,4 +1,4 @@
-"""The angular acceleration of CustomJoints: ours is the derivative of the velocity, Simbody's on request."""
+"""Tests of the angular acceleration of CustomJoints: the derivative of the velocity, or Simbody's on request."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from tests.mechanics.multibody.cases import alone
 
 
 def _knee(*, opensim_derivatives: bool) -> Mechanism:
-    """A shank on a joint whose first coordinate drives all three rotations, and two translations."""
+    """Return a shank on a joint whose first coordinate drives all three rotations and a translation."""
     axes = [
         JointAxis((0,), (0.0, 0.0, 1.0), f.IDENTITY),
         JointAxis((0,), (1.0, 0.0, 0.0), f.Polynomial((0.3, 0.5, 0.1))),
@@ -46,7 +46,15 @@ def _knee(*, opensim_derivatives: bool) -> Mechanism:
 
 
 def _energy_change(mechanism: Mechanism, q, u, steps: int, step: float) -> float:
-    """How much energy a motion under gravity gains, in parts of the energy in it; by Runge and Kutta's method."""
+    """Return the relative change of the energy during a motion under gravity, integrated by Runge-Kutta's method.
+
+    Args:
+        mechanism: the mechanism.
+        q: initial coordinates.
+        u: initial speeds.
+        steps: number of steps.
+        step: length of a step (s).
+    """
 
     def rates(q, u):
         return mechanism.coordinate_rates(q, u), mechanism.acceleration(q, u)
@@ -79,11 +87,11 @@ def test_the_two_agree_on_everything_but_accelerations():
     one, other = ours.at(q, u), theirs.at(q, u)
     assert other.velocities == pytest.approx(one.velocities, abs=1e-15)
     assert other.origins == pytest.approx(one.origins, abs=1e-15)
-    # At rest there is nothing to be wrong about.
+    # At rest, Simbody's error vanishes.
     assert theirs.acceleration(q, 0 * u) == pytest.approx(ours.acceleration(q, 0 * u), rel=1e-13)
     assert np.abs(theirs.acceleration(q, u) - ours.acceleration(q, u)).max() > 0.01
     assert theirs.bodies[0].mobilizer.elementary()[1:-1] != ()
-    # Three joints that only accelerate stand for the difference.
+    # Three joints that only accelerate represent the difference.
     assert (
         len(theirs.bodies[0].mobilizer.elementary())
         == len(ours.bodies[0].mobilizer.elementary()) + 3
@@ -104,7 +112,7 @@ def test_where_each_coordinate_has_its_rotation_the_two_agree():
 
 @pytest.mark.parametrize("opensim_derivatives", [False, True])
 def test_energy_of_a_real_model(corpus, opensim_derivatives):
-    """Rajagopal's model as Lai and Uhlrich have it, falling with bent knees."""
+    """The model is Rajagopal's in the version of Lai and Uhlrich, falling with bent knees."""
     path = next(model.converted for model in corpus if model.id == "m0954")
     model = read_text(gzip.decompress(path.read_bytes()).decode())
     mechanism = build_mechanism(model, opensim_derivatives=opensim_derivatives)

@@ -88,15 +88,14 @@ def test_inverse_dynamics_undoes_acceleration(case: Case):
     matrix = mechanism.mass_matrix(q)
     needed = mechanism.inverse_dynamics(q, u, udot)
     _close(needed, matrix @ udot + mechanism.bias(q, u) - mechanism.gravity_forces(q), 1e-12)
-    # Compared as forces: where a random joint moves next to no mass the accelerations themselves
-    # say little.
+    # Compare forces: where a random joint moves nearly no mass, accelerations are ill-conditioned.
     result = mechanism.acceleration(q, u, generalized_forces=needed)
     _close(matrix @ result, matrix @ udot, 1e-11 * (1.0 + np.abs(result).max(initial=0.0)))
 
 
 @given(cases())
 def test_the_power_of_the_forces_changes_the_energy(case: Case):
-    """Along a motion the kinetic energy grows by what gravity and the forces that make the motion deliver."""
+    """The kinetic energy grows by the work of gravity and of the applied forces."""
     mechanism, q, u, udot = case
     forces = mechanism.inverse_dynamics(q, u, udot)
     rates, step = mechanism.rate_matrix(q), 1e-5
@@ -114,7 +113,7 @@ def test_the_power_of_the_forces_changes_the_energy(case: Case):
 
 @given(cases())
 def test_velocity_forces_take_no_power_but_that_of_the_changing_mass_matrix(case: Case):
-    """u·C is the rate of change of the kinetic energy while u stays as it is."""
+    """u·C is the rate of change of the kinetic energy for constant u."""
     mechanism, q, u, _ = case
     rates, step = mechanism.rate_matrix(q), 1e-5
     qdot, qddot = rates @ u, mechanism.rate_bias(q, u)

@@ -1,4 +1,4 @@
-"""Numbers and words that no model should have: a result or one sentence, never a traceback or a warning of numpy's."""
+"""Tests of extreme numbers and wrong words in models: a result or a one-line error, but no traceback or warning."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def one_body(joint: type) -> Model:
 
 
 def used(model: Model) -> None:
-    """Let every part look at a model that computes without a compiler."""
+    """Apply everything that computes without a compiler to a model."""
     with np.errstate(over="warn", divide="warn", invalid="warn"):
         osimlite.validate(model, ignore="OSIM63")
         for use in (_mechanism, osimlite.to_urdf, osimlite.to_mjcf):
@@ -74,7 +74,15 @@ def _mechanism(model: Model) -> None:
 
 
 def changed(text: str, draw: random.Random) -> Iterator[tuple[str, str]]:
-    """A text with one number, or one word, that is as it should not be."""
+    """Yield variants of a text with one extreme number or one wrong word.
+
+    Args:
+        text: text of the model.
+        draw: source of random numbers.
+
+    Returns:
+        Iterator over texts and descriptions of the changes.
+    """
     from tests.oracle.structural_edits import Text
 
     whole = Text(text)
@@ -205,6 +213,6 @@ def test_words_for_axes_are_read_by_their_first_letter(ab: str, across: str, axe
         )
     model.add(frame)
     rotation = osimlite.mechanism(model).frames["/componentset/f"].transform[:3, :3]
-    # From a to b is along x of ground, across all three points along z.
+    # From a to b is ground's x axis, and from all three points follows the z axis.
     assert rotation["xyz".index("x"), "xyz".index(axes[0])] == pytest.approx(1.0)
     assert rotation["xyz".index("z"), "xyz".index(axes[1])] == pytest.approx(1.0)

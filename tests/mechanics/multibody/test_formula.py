@@ -1,4 +1,4 @@
-"""Formulas of expression-based forces: grammar, code and what is said of wrong ones."""
+"""Tests of the formulas of expression-based forces: grammar, generated code and error messages."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def test_definitions_that_double_are_written_once():
     ],
 )
 def test_what_drops_out_may_be_unknown_or_nan(text, expected):
-    """As in Lepton, which OpenSim simplifies formulas by before it computes them."""
+    """Lepton, by which OpenSim simplifies formulas before it evaluates them, removes such terms too."""
     if expected is None:
         with pytest.raises(ModelError, match="there is no 'x'"):
             value(text)
@@ -129,7 +129,7 @@ LONG = choose(8_000, 20_000)
 )
 def test_no_length_and_no_depth_is_too_much(text, expected):
     result = value(text)
-    # The power has a limit, where x = 0.7^x.
+    # The nested power converges to the solution of x = 0.7^x.
     assert result == pytest.approx(0.7**result if expected is None else expected)
 
 

@@ -24,7 +24,7 @@ def _label(item):
 def test_values_and_derivatives_are_opensims(item):
     built = function(item["spec"])
     knots = item["spec"].get("x", ())
-    # Where two abscissae coincide OpenSim's own numbers carry nine digits.
+    # Where two abscissae coincide, the values from OpenSim have nine digits.
     tolerance = 1e-8 if len(set(knots)) < len(knots) else 1e-13
     for x, *expected in item["rows"]:
         value, gradient, hessian = built.evaluate(np.array((x,)))
@@ -43,7 +43,7 @@ def test_values_and_derivatives_are_opensims(item):
     ],
 )
 def test_at_a_knot_the_neighbour_is_the_one_opensim_takes(count, values, slopes):
-    """Squares at 0, 1, 2 ...: what OpenSim 4.6 returns exactly at the knots."""
+    """The points are squares at 0, 1, 2 ...; OpenSim 4.6 returns these values exactly at the knots."""
     x = tuple(float(k) for k in range(count))
     y = tuple(k * k for k in x)
     knots = [np.array((k,)) for k in x]
@@ -99,7 +99,13 @@ def test_a_sine_is_a_sine():
 def _slopes(
     function: f.SmoothFunction, at: np.ndarray, step: float = 1e-5
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Gradient and Hessian by central differences."""
+    """Return gradient and Hessian by central differences.
+
+    Args:
+        function: the function.
+        at: point.
+        step: step of the differences.
+    """
     pairs = [
         [function.evaluate(at + sign * step * np.eye(len(at))[k]) for sign in (1.0, -1.0)]
         for k in range(len(at))
@@ -125,7 +131,7 @@ def test_a_polynomial_of_several_variables_has_the_derivatives_of_its_values(
 
 
 def test_the_monomials_come_in_opensims_order():
-    # 1, y, y², x, xy, x²
+    # The order is 1, y, y², x, xy, x².
     polynomial = f.MultivariatePolynomial.complete((1.0, 10.0, 100.0, 1e3, 1e4, 1e5), 2, 2)
     value, gradient, hessian = polynomial.evaluate(np.array((2.0, 3.0)))
     assert value == 1.0 + 30.0 + 900.0 + 2e3 + 6e4 + 4e5

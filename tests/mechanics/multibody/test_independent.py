@@ -1,4 +1,4 @@
-"""What the kernels find of a mechanism, beside formulas of another kind in numpy."""
+"""Tests of the kernels against independent formulas in numpy."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def same(ours, theirs, what: str) -> None:
 
 
 def same_mechanics(mechanism: Mechanism, q, u) -> Moved:
-    """Check all but accelerations."""
+    """Compare everything except accelerations, and return the reference."""
     ours, theirs = mechanism.at(q, u, 0.3), kinematics(mechanism, q, u, 0.3)
     for name in KINEMATICS:
         same(getattr(ours, name), getattr(theirs, name), name)

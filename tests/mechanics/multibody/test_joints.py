@@ -62,7 +62,7 @@ def test_kinematics_are_opensims(pair):
 def test_a_reversed_joint_is_the_inverse(pair):
     case = pair[1]
     q, u, _ = _state(case)
-    # The joint's parent is the body now: what was the body in ground is ground in the body.
+    # The body is the joint's parent now: its pose in ground becomes the pose of ground in the body.
     forward, backward = mechanism_of(case).at(q, u), mechanism_of(case, turned_round=True).at(q, u)
     assert backward.transform(0) == pytest.approx(invert_transform(forward.transform(0)), abs=1e-13)
     w, v = np.split(forward.velocities[0], 2)
@@ -153,7 +153,7 @@ def test_an_axis_needs_a_direction():
 
 @given(st.sampled_from(JOINT_TYPES), st.integers(0, 2**32 - 1), st.booleans())
 def test_bias_and_rate_bias_are_derivatives(joint_type, seed, turned_round):
-    """Differences along the motion that the speeds make while they stay as they are."""
+    """Compare with differences along a motion with constant speeds."""
     rng = np.random.default_rng(seed)
     motions = motions_of(joint_type, rng)
     count = coordinates_of(motions)
@@ -176,7 +176,9 @@ def test_bias_and_rate_bias_are_derivatives(joint_type, seed, turned_round):
 
 
 def test_a_rod_that_bends_evenly_is_an_arc():
-    """As long as the rod, upright at its start, along the child's Y axis at its end; straight where it is not bent."""
+    """The arc has the length of the rod, begins along Y, and ends along the child's Y axis; without bending it is
+    straight.
+    """
     length, q = 0.7, np.array((0.6, -0.9, 0.3))
     motions = constant_curvature(length, (0.1, 0.2, -0.3))
     rod = alone(Mobilizer("/j", "ConstantCurvatureJoint", motions, (0, 1, 2)))

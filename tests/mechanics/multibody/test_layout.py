@@ -1,4 +1,4 @@
-"""Records are written by the names of their fields."""
+"""Tests of packed records, which are written by the names of their fields."""
 
 from __future__ import annotations
 

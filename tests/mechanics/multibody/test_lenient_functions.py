@@ -1,4 +1,4 @@
-"""Functions whose numbers OpenSim 4.6 does not take as one expects: values that it computes (measured)."""
+"""Tests of functions with unusual numbers: values equal those that OpenSim 4.6 computes (measured)."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_a_function_has_the_values_of_opensim(function, values):
 
 
 def test_a_linear_function_takes_the_coefficient_behind_the_weights_for_the_constant():
-    # OpenSim's calcValue of (1, 5, 7) at (1, 1) is 13, of (1, 2, 3, 4) it is 6.
+    # OpenSim's calcValue of (1, 5, 7) at (1, 1) is 13, and that of (1, 2, 3, 4) is 6.
     for coefficients, value in (((1.0, 5.0, 7.0), 13.0), ((1.0, 2.0, 3.0, 4.0), 6.0)):
         function = convert_function(LinearFunction(coefficients=coefficients), 2, "it")
         assert function.evaluate((1.0, 1.0))[0] == value

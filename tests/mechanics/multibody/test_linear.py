@@ -25,6 +25,6 @@ def test_repeated_equations_say_nothing_new(count, repeated, size, seed):
 
 def test_contradictions_are_shared():
     shortest, free = solve_with_null_space(np.array(((1.0, 0.0), (2.0, 0.0))), np.array((1.0, 6.0)))
-    # x = 1 and x = 3, whatever the scale they are written in.
+    # The equations say x = 1 and x = 3; their scale does not matter.
     assert shortest == pytest.approx((2.0, 0.0))
     assert np.abs(free[:, 0]) == pytest.approx((0.0, 1.0))

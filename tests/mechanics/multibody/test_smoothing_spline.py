@@ -10,8 +10,7 @@ from osimlite.mechanics.multibody.smoothing_spline import derivatives_of_samples
 X = (0.0, 0.3, 0.5, 1.1, 1.2, 1.9, 2.4, 2.5, 3.1, 3.3)
 Y = (0.1, 0.5, 0.4, 1.2, 1.0, 0.3, -0.4, -0.5, -0.2, 0.3)
 
-# Value, first and second derivative in OpenSim 4.6 at 0.0, 0.77 and 3.3; keys: half order, error
-# variance.
+# Value, first and second derivative in OpenSim 4.6 at 0.0, 0.77 and 3.3, by half order and error variance.
 OPENSIM = {
     (1, 0.0): (
         (0.1, 1.333333333333, 0),
@@ -87,7 +86,7 @@ def test_it_goes_through_the_points_and_is_natural(half_order, count, seed):
     x, y = np.cumsum(rng.uniform(0.05, 0.2, count)), rng.uniform(-1.0, 1.0, count)
     spline = smoothing_spline(x, y, half_order, 0.0)
     assert [_at(spline, knot)[0] for knot in x] == pytest.approx(y, abs=1e-8)
-    # Beyond the ends it is a polynomial of degree half_order - 1.
+    # Beyond the ends, the spline is a polynomial of degree half_order - 1.
     ends = [_at(spline, x[0] - 0.1 * k)[0] for k in range(1, half_order + 2)]
     assert np.diff(ends, half_order) == pytest.approx(
         np.zeros(1), abs=1e-7 * (1.0 + np.abs(ends).max())
@@ -98,8 +97,8 @@ def test_it_goes_through_the_points_and_is_natural(half_order, count, seed):
 def test_it_is_opensims(case):
     half_order, error_variance = case
     spline = smoothing_spline(X, Y, half_order, error_variance)
-    # The search for the smoothing ends a little apart from OpenSim's. Degree 7 through unequal
-    # points costs digits: 1.1e-11 beside sixty digits on one processor, less than 1e-11 on others.
+    # The search for the smoothing parameter ends near OpenSim's. Degree 7 with unequal knots loses digits: against a
+    # computation with sixty digits the error is 1.1e-11 on one processor, and less than 1e-11 on others.
     exact = 1e-11 if half_order < 4 else 1e-10
     tolerance = exact if error_variance == 0.0 else 2e-5
     for x, expected in zip((0.0, 0.77, 3.3), OPENSIM[case], strict=True):
@@ -108,7 +107,7 @@ def test_it_is_opensims(case):
 
 @pytest.mark.parametrize("half_order", [1, 2, 3])
 def test_the_residuals_have_the_variance_asked_for(half_order):
-    """For a smooth curve with noise, smoothing by a known variance leaves nearly that in the residuals."""
+    """With the variance of the noise as error variance, the spline is much closer to the true curve than the data."""
     rng = np.random.default_rng(5)
     x = np.linspace(0.0, 6.0, 200)
     noise = 0.05 * rng.normal(size=200)

@@ -38,7 +38,7 @@ def test_body_fixed_angles_are_three_turns_in_a_row(angles):
 @given(vectors, st.sampled_from([None, np.pi]))
 def test_quaternions_turn_as_their_rotations(angles, third):
     if third is not None:
-        # Half a turn: the scalar is zero.
+        # The scalar part of the quaternion is zero after half a turn.
         angles = np.array((0.0, 0.0, third))
     rotation = rotation_xyz(angles)
     w, *v = quaternion_of(rotation)

@@ -1,1 +1,1 @@
-"""The mechanics of mechanisms in numpy, by other formulas than the kernels': what these are checked by."""
+"""Multibody mechanics in numpy by other formulas than those of the kernels, as a reference for tests."""

@@ -1,4 +1,4 @@
-"""The equations of constraints: vectors that move with bodies, from one station to another or fixed along an axis."""
+"""Constraint equations from vectors that move with bodies: between stations, or fixed along an axis."""
 
 from __future__ import annotations
 
@@ -20,7 +20,14 @@ from tests.mechanics.multibody.independent.motion import Moved
 
 
 class Bond(NamedTuple):
-    """m equations at one state: `errors` e (p,) of positions, `rows` u = `rates`, and `rows` udot = `drifts`."""
+    """Equations of a constraint at one state: G u = b for speeds and G udot = d for accelerations, m rows each.
+
+    Attributes:
+        errors: position errors (p,).
+        rows: constraint matrix G (m, n).
+        rates: right-hand side b of the speeds (m,).
+        drifts: right-hand side d of the accelerations (m,).
+    """
 
     errors: Array
     rows: Array
@@ -29,7 +36,7 @@ class Bond(NamedTuple):
 
 
 def bond(constraint: ConstraintEquations, state: Moved) -> Bond:
-    """The equations of a constraint."""
+    """Return the equations of a constraint at a state."""
     mechanism, q, u = state.mechanism, state.q, state.u
     match constraint:
         case Lock(coordinate):
@@ -51,7 +58,7 @@ def bond(constraint: ConstraintEquations, state: Moved) -> Bond:
             rates = mechanism.coordinate_rates(q, u)[others]
             np.add.at(row[0], others, gradient)
             row[0, dependent] -= 1.0
-            # Of a coupler without independent coordinates the Hessian is an empty list.
+            # The Hessian of a coupler without independent coordinates is an empty list.
             bends = np.reshape(hessian, (len(others), len(others)))
             drift = -(row @ mechanism.rate_bias(q, u)) - rates @ bends @ rates
             return Bond(
@@ -99,7 +106,7 @@ def bond(constraint: ConstraintEquations, state: Moved) -> Bond:
 
 
 def rolling(constraint: b.RollingConstraint, state: Moved) -> Bond:
-    """The height, and the turn about the normal."""
+    """Return the holonomic equations of rolling: height of the centre, and no turn about the normal."""
     surface, roller = constraint.surface, constraint.roller
     centre, foot = (
         station(state, StationPlacement(body, np.zeros(3))) for body in (roller, surface)
@@ -112,7 +119,10 @@ def rolling(constraint: b.RollingConstraint, state: Moved) -> Bond:
 
 
 def slips(constraint: b.RollingConstraint, state: Moved) -> list[Bond]:
-    """The roller's material point at the foot, whose place in the roller changes, moves along with the surface."""
+    """Return the no-slip equations of rolling.
+
+    The material point of the roller at the foot moves with the surface; its station in the roller changes.
+    """
     surface, roller = constraint.surface, constraint.roller
     centre, foot = (
         station(state, StationPlacement(body, np.zeros(3))) for body in (roller, surface)
@@ -132,9 +142,13 @@ def slips(constraint: b.RollingConstraint, state: Moved) -> list[Bond]:
 
 
 class MovingVector(NamedTuple):
-    """A vector (3,) along ground's axes, the matrix (3, n) from the speeds to its rate, the rate, and the rest.
+    """Vector (3,) in ground axes that moves with bodies.
 
-    `bias` is its second derivative while all udot are zero.
+    Attributes:
+        value: the vector.
+        jacobian: matrix (3, n) from the speeds to its rate.
+        rate: first derivative.
+        bias: second derivative while all udot are zero.
     """
 
     value: Array
@@ -143,16 +157,16 @@ class MovingVector(NamedTuple):
     bias: Array
 
     def minus(self, other: MovingVector) -> MovingVector:
-        """The difference of two vectors."""
+        """Return the difference of two vectors."""
         return MovingVector(*(mine - its for mine, its in zip(self, other, strict=True)))
 
     def bond(self) -> Bond:
-        """All three components vanish."""
+        """Return the equations by which all three components vanish."""
         return Bond(self.value, self.jacobian, np.zeros(3), -self.bias)
 
 
 def station(state: Moved, place: StationPlacement) -> MovingVector:
-    """From ground's origin to a station."""
+    """Return the vector from ground's origin to a station."""
     body, location = place
     return MovingVector(
         state.point(body, location),
@@ -163,10 +177,11 @@ def station(state: Moved, place: StationPlacement) -> MovingVector:
 
 
 def meeting(state: Moved, first: StationPlacement, second: StationPlacement) -> MovingVector:
-    """From one station to another, and how fast the second leaves the point of the first body that is there.
+    """Return the vector from one station to another.
 
-    This is what Simbody holds still: as the first body sees it, the rate of the vector, and as the
-    body sees it that carries both, how that changes.
+    Its rate is the velocity of the second station relative to the coincident point of the first body. Simbody keeps
+    this velocity at zero: the rate of the vector as seen from the first body, and its change as seen from the body that
+    carries both.
     """
     end = station(state, second)
     body = first.body
@@ -180,7 +195,13 @@ def meeting(state: Moved, first: StationPlacement, second: StationPlacement) -> 
 
 
 def direction(state: Moved, body: int, axis: Array) -> MovingVector:
-    """A vector fixed in a body."""
+    """Return a vector that is fixed in a body.
+
+    Args:
+        state: kinematics of the mechanism.
+        body: index of the body.
+        axis: the vector in the frame of the body.
+    """
     value = state.rotations[body] @ axis
     w = state.velocities[body][:3]
     rate = cross(w, value)
@@ -189,7 +210,7 @@ def direction(state: Moved, body: int, axis: Array) -> MovingVector:
 
 
 def product(a: MovingVector, b: MovingVector, wanted: float = 0.0) -> Bond:
-    """The scalar product of two vectors has a certain value."""
+    """Return the equation by which the scalar product of two vectors has the value `wanted`."""
     return Bond(
         np.array((a.value @ b.value - wanted,)),
         (a.value @ b.jacobian + b.value @ a.jacobian)[None],
@@ -199,5 +220,5 @@ def product(a: MovingVector, b: MovingVector, wanted: float = 0.0) -> Bond:
 
 
 def joined(*bonds: Bond) -> Bond:
-    """All the equations of several bonds."""
+    """Concatenate the equations of several constraints."""
     return Bond(*(np.concatenate(parts) for parts in zip(*bonds, strict=True)))

@@ -1,4 +1,4 @@
-"""Forces and accelerations: Newton's and Euler's equations of every body, projected on the speeds (Kane's form)."""
+"""Forces and accelerations by the Newton-Euler equations of all bodies, projected on the speeds (Kane's method)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,10 @@ from tests.mechanics.multibody.independent.motion import Moved
 
 @dataclass(frozen=True, eq=False)
 class MassCentres:
-    """The b bodies of a mechanism at one state, seen from their mass centres, along ground's axes."""
+    """Inertial properties and Jacobians of the b bodies of a mechanism at one state, at their mass centres.
+
+    All vectors are along ground's axes.
+    """
 
     state: Moved
     masses: Array  # (b,), kg
@@ -29,7 +32,7 @@ class MassCentres:
 
     @classmethod
     def compute(cls, state: Moved) -> MassCentres:
-        """See a mechanism at `state` from its mass centres."""
+        """Compute inertias and Jacobians at the mass centres."""
         masses, centres, inertias = state.mechanism.inertial
         rotations, jacobians = state.rotations[:-1], state.jacobians[:-1]
         arms = (rotations @ centres[:, :, None])[:, :, 0]
@@ -45,13 +48,13 @@ class MassCentres:
         )
 
     def mass_matrix(self) -> Array:
-        """M (n, n) of the kinetic energy ½ uᵀ M u."""
+        """Return the mass matrix M (n, n) of the kinetic energy ½ uᵀ M u."""
         matrix = _projected(self.turning, self.inertias @ self.turning)
         matrix += _projected(self.moving, self.masses[:, None, None] * self.moving)
         return 0.5 * (matrix + matrix.T)
 
     def inertia_forces(self, body_accelerations: Array) -> Array:
-        """Generalized forces (n,) that give the bodies these spatial accelerations (b + 1, 6)."""
+        """Return the generalized forces (n,) that give the bodies these spatial accelerations (b + 1, 6)."""
         w = self.state.velocities[:-1, :3]
         alpha, a = body_accelerations[:-1, :3], body_accelerations[:-1, 3:]
         a_centre = a + np.cross(alpha, self.arms) + np.cross(w, np.cross(w, self.arms))
@@ -61,13 +64,23 @@ class MassCentres:
         )
 
     def gravity_forces(self) -> Array:
-        """Generalized forces of gravity (n,)."""
+        """Return the generalized forces of gravity (n,)."""
         weights = self.masses[:, None] * self.state.mechanism.gravity
         return _projected(self.moving, weights)
 
 
 def acceleration(state: Moved, applied: Array) -> Array:
-    """Udot (n,) with M udot = f but for what makes G udot = b; by the null space of G, if M cannot be divided by."""
+    """Solve M udot = f with constraint forces for G udot = d.
+
+    Use the null space of G if the mass matrix is nearly singular.
+
+    Args:
+        state: kinematics of the mechanism.
+        applied: applied generalized forces (n,).
+
+    Returns:
+        Accelerations udot (n,).
+    """
     bodies, constraints = MassCentres.compute(state), state.mechanism.constraints
     matrix = bodies.mass_matrix()
     right = applied + bodies.gravity_forces() - bodies.inertia_forces(state.biases)
@@ -82,10 +95,10 @@ def acceleration(state: Moved, applied: Array) -> Array:
         factor = np.linalg.cholesky(matrix)
         if np.min(factor.diagonal() ** 2 / matrix.diagonal()) > SAFE_MASS:
             udot = np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
-            # What moves nothing by more than rounding binds nothing.
+            # Rows that are zero up to rounding restrict nothing.
             binding = np.where(np.abs(rows).max(axis=1, keepdims=True) > ROUNDING, rows, 0.0)
             weighted = np.linalg.solve(factor, binding.T).T
-            # The second time mends the rounding of the first.
+            # The second iteration corrects rounding errors of the first.
             for _ in range(2):
                 push = solve_least_norm(weighted, values - rows @ udot, SLIGHT * sqrt(len(rows)))
                 udot = udot + np.linalg.solve(factor.T, push)
@@ -96,12 +109,12 @@ def acceleration(state: Moved, applied: Array) -> Array:
 
 
 def _times(matrices: Array, vectors: Array) -> Array:
-    """Each matrix (b, 3, 3) times its vector (b, 3)."""
+    """Multiply each matrix (b, 3, 3) by its vector (b, 3)."""
     return (matrices @ vectors[:, :, None])[:, :, 0]
 
 
 def _projected(jacobians: Array, loads: Array) -> Array:
-    """Sum over the bodies of each Jacobian (b, 3, n), transposed, times its load (b, 3) or loads (b, 3, m)."""
+    """Sum over the bodies the transpose of each Jacobian (b, 3, n) times its load (b, 3) or loads (b, 3, m)."""
     count, _, size = jacobians.shape
     flat = jacobians.reshape(3 * count, size)
     return flat.T @ loads.reshape(3 * count, *loads.shape[2:])

@@ -1,4 +1,4 @@
-"""How joints move bodies: transforms, Jacobians, velocities and accelerations, in one pass from the root outwards."""
+"""Kinematics of mechanisms in one pass outwards: transforms, Jacobians, velocities and accelerations of bodies."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from osimlite.mechanics.multibody.spatial import (
 
 @dataclass(frozen=True, eq=False)
 class Moved:
-    """A mechanism of b bodies and n coordinates at one state, as `MechanismKinematics` has it."""
+    """Kinematics of b bodies and n coordinates at one state, with the fields of `MechanismKinematics`."""
 
     mechanism: Mechanism
     q: Array
@@ -42,32 +42,32 @@ class Moved:
     biases: Array
 
     def point(self, body: int, station: Array) -> Array:
-        """Position in ground (3,) of a `station` (3,) given in the body's frame."""
+        """Return the position in ground (3,) of a `station` (3,) in the body's frame."""
         return self.origins[body] + self.rotations[body] @ station
 
     def point_velocity(self, body: int, station: Array) -> Array:
-        """Velocity in ground (3,) of a `station` (3,) given in the body's frame."""
+        """Return the velocity in ground (3,) of a `station` (3,) in the body's frame."""
         velocity: Array = self.velocities[body]
         return velocity[3:] + cross(velocity[:3], self.rotations[body] @ station)
 
     def point_bias(self, body: int, station: Array) -> Array:
-        """Acceleration in ground (3,) of a `station` (3,) of the body while all udot are zero."""
+        """Return the acceleration in ground (3,) of a `station` (3,) of the body while all udot are zero."""
         arm, w = self.rotations[body] @ station, self.velocities[body][:3]
         bias: Array = self.biases[body]
         return bias[3:] + cross(bias[:3], arm) + cross(w, cross(w, arm))
 
     def point_jacobian(self, body: int, station: Array) -> Array:
-        """Matrix (6, n) from the speeds to the body's angular velocity and the velocity of its `station`."""
+        """Return the matrix (6, n) from the speeds to the body's angular velocity and the velocity of its `station`."""
         matrix: Array = self.jacobians[body].copy()
         matrix[3:] -= skew_matrix(self.rotations[body] @ station) @ matrix[:3]
         return matrix
 
 
 def kinematics(mechanism: Mechanism, q: Array, u: Array, time: float = 0.0) -> Moved:
-    """Poses, Jacobians, velocities and velocity-dependent accelerations at `q` (n,) and `u` (n,)."""
+    """Compute poses, Jacobians, velocities and velocity-dependent accelerations at `q` (n,) and `u` (n,)."""
     count, size = len(mechanism.bodies), len(q)
     rotations, origins = np.empty((count + 1, 3, 3)), np.zeros((count + 1, 3))
-    # The columns of RelativeMotion, for each body in ground.
+    # Columns as in RelativeMotion.block, for each body relative to ground.
     blocks = np.zeros((count + 1, 6, size + 2))
     rotations[-1] = np.eye(3)
     for index, body in enumerate(mechanism.bodies):
@@ -84,7 +84,7 @@ def kinematics(mechanism: Mechanism, q: Array, u: Array, time: float = 0.0) -> M
 
 
 def carrying(mobilizer: Mobilizer, q: Array, u: Array) -> RelativeMotion:
-    """Motion of the carried body in the carrying body, at the joint's own `q` and `u` (k,)."""
+    """Return the motion of the carried body relative to the carrying body, at the joint's `q` and `u` (k,)."""
     ends = (
         FixedTransform(mobilizer.parent_frame),
         *mobilizer.motions,
@@ -95,7 +95,7 @@ def carrying(mobilizer: Mobilizer, q: Array, u: Array) -> RelativeMotion:
 
 
 def relative(motion: JointMotion, q: Array, u: Array) -> RelativeMotion:
-    """Motion of the outgoing frame in the incoming frame, at `q` and `u` (k,) of the joint."""
+    """Return the motion of the outgoing frame relative to the incoming frame, at the joint's `q` and `u` (k,)."""
     own, block = list(motion.coordinates), np.zeros((6, len(q) + 2))
     match motion:
         case FixedTransform(matrix):
@@ -127,9 +127,9 @@ def relative(motion: JointMotion, q: Array, u: Array) -> RelativeMotion:
 
 
 def curvature(error: SimbodyAccelerationError, q: Array) -> Array:
-    """H (3, k, k) of the error: its component i is uᵀ H[i] u."""
+    """Return H (3, k, k) of Simbody's acceleration error, whose component i is uᵀ H[i] u."""
     count = len(q)
-    # By coordinate: what a unit speed of it does to each angle.
+    # Column k: derivatives of the angles by coordinate k.
     axes, shares, rotation = [], np.zeros((3, count)), np.eye(3)
     for row, turn in enumerate(error.rotations):
         own = list(turn.coordinates)
@@ -139,8 +139,7 @@ def curvature(error: SimbodyAccelerationError, q: Array) -> Array:
         rotation = rotation @ rotation_about(turn.axis, amount)
     along, curvature = np.array(axes).T, np.zeros((3, count, count))
     for row in (1, 2):
-        # (3, k): the rate of this axis by what Simbody takes for the rates of the angles before it,
-        # less the true.
+        # Rate of this axis (3, k) by the rates that Simbody uses for the preceding angles, minus the correct one.
         theirs = np.zeros((3, count))
         theirs[:, :row] = along @ shares[:, :row]
         wrong = -skew_matrix(axes[row]) @ (theirs - along[:, :row] @ shares[:row])
@@ -149,17 +148,17 @@ def curvature(error: SimbodyAccelerationError, q: Array) -> Array:
 
 
 def turned(rotation: Array, block: Array) -> Array:
-    """Spatial vectors, the columns of `block` (6, c), turned by `rotation` (3, 3)."""
+    """Rotate spatial vectors, the columns of `block` (6, c), by `rotation` (3, 3)."""
     return (rotation @ block.reshape(2, 3, -1)).reshape(6, -1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RelativeMotion:
-    """Where frame B is in frame A, and how k generalized speeds move it there. Everything is expressed in A.
+    """Pose and motion of frame B relative to frame A under k generalized speeds, expressed in A.
 
-    The columns of `block` (6, k + 2) are spatial vectors: the Jacobian of the k speeds, then the
-    velocity, then the part of the acceleration that does not depend on the derivatives of the
-    speeds. They stand together because composing motions does nearly the same to all of them.
+    The columns of `block` (6, k + 2) are spatial vectors: the Jacobian of the k speeds, the velocity, and the part of
+    the acceleration that does not depend on the derivatives of the speeds. Composition of motions treats all of them
+    nearly alike, so they share one array.
     """
 
     rotation: Array
@@ -168,17 +167,17 @@ class RelativeMotion:
 
     @classmethod
     def fixed(cls, matrix: Array, speeds: int) -> RelativeMotion:
-        """A frame that does not move, seen among `speeds` generalized speeds."""
+        """Return the motion of a frame that is fixed in A, for `speeds` generalized speeds."""
         return cls(matrix[:3, :3], matrix[:3, 3], np.zeros((6, speeds + 2)))
 
     @property
     def matrix(self) -> Array:
-        """The homogeneous matrix (4, 4) of B in A."""
+        """Homogeneous matrix (4, 4) of B in A."""
         return make_transform(self.rotation, self.translation)
 
     @property
     def jacobian(self) -> Array:
-        """The matrix (6, k) from the speeds to the velocity of B in A."""
+        """Matrix (6, k) from the speeds to the velocity of B in A."""
         return self.block[:, :-2]
 
     @property
@@ -192,7 +191,7 @@ class RelativeMotion:
         return self.block[:, -1]
 
     def then(self, other: RelativeMotion) -> RelativeMotion:
-        """Motion of C in A, if `self` is that of B in A and `other` that of C in B."""
+        """Return the motion of C in A, where `self` is that of B in A and `other` that of C in B."""
         arm = self.rotation @ other.translation
         moved = turned(self.rotation, other.block)
         block = carried(self.block, arm, moved[:, -2])
@@ -200,7 +199,7 @@ class RelativeMotion:
         return RelativeMotion(self.rotation @ other.rotation, self.translation + arm, block)
 
     def inverse(self) -> RelativeMotion:
-        """Motion of A in B, for the same generalized speeds."""
+        """Return the motion of A in B for the same generalized speeds."""
         back, p = self.rotation.T, self.translation
         w, v = self.block[:3, -2], self.block[3:, -2]
         block = self.block.copy()
@@ -210,11 +209,14 @@ class RelativeMotion:
 
 
 def carried(block: Array, arm: Array, relative_velocity: Array) -> Array:
-    """What a frame C that moves in B has from the motion of B in A; add its own motion in B, turned into A.
+    """Return the contribution of the motion of B in A to the motion of a frame C that moves in B.
 
-    Args: block: columns of :class:`RelativeMotion` of B in A (6, c). arm: from B's origin to C's
-        origin, in A (3,). relative_velocity: spatial velocity of C in B, in A (6,); it makes the
-        Coriolis acceleration.
+    The motion of C in B, rotated into A, must be added.
+
+    Args:
+        block: columns of :class:`RelativeMotion` of B in A (6, c).
+        arm: vector from B's origin to C's origin, in A (3,).
+        relative_velocity: spatial velocity of C in B, in A (6,), for the Coriolis acceleration.
     """
     result = block.copy()
     result[3:] -= skew_matrix(arm) @ block[:3]
