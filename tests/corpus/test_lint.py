@@ -15,7 +15,7 @@ from osimlite.lint import validate
 from tests.conftest import CorpusModel
 
 PROVED = {
-    # Massless fingers end a chain: the mass matrix is singular, and accelerations are NaN.
+    # Massless fingers are at the ends of chains: the mass matrix is singular, and accelerations are NaN.
     "m0109": {"OSIM407"},
     # The class has no property derivative_smoothing: it is missing in OpenSim's own print of the
     # file.

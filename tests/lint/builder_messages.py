@@ -1,4 +1,4 @@
-"""The messages with which the builder of mechanisms and forces refuses a model, read from its source."""
+"""Messages with which the builder of mechanisms and forces rejects a model, read from its source code."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ PARTS = (
     "mechanics/multibody/schema_joints.py",
     "simulation/elements",
 )
-"""Modules that build what a model describes."""
+"""Modules that build mechanisms and forces from a model."""
 
 ERRORS = {
     "ModelError",
@@ -38,13 +38,13 @@ ERRORS = {
 
 
 class Message(NamedTuple):
-    """One message: the module that raises it, and its text with `{}` for what is filled in."""
+    """Message of the builder: the module that raises it, and its text with `{}` for inserted values."""
 
     module: str
     text: str
 
     def matches(self, message: str) -> bool:
-        """Return whether a message of the builder is this one."""
+        """Return whether a text of the builder is this message."""
         parts = map(re.escape, self.text.split("{}"))
         return re.search(".*?".join(parts), message, re.DOTALL) is not None
 
@@ -73,7 +73,7 @@ def read_messages() -> list[Message]:
 
 
 def _template(node: ast.expr) -> str | None:
-    """Return the text of a string with `{}` for its expressions; None of anything else."""
+    """Return the text of a string with `{}` for its variable parts, or None for another expression."""
     if isinstance(node, ast.Constant) and isinstance(node.value, str):
         return node.value
     if isinstance(node, ast.JoinedStr):

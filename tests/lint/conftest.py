@@ -1,4 +1,4 @@
-"""Tests of the linter keep nothing in the cache of whoever runs them."""
+"""Fixture that keeps the linter's tests out of the user's cache."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 def findings_cache(
     monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory
 ) -> Path:
-    """Let findings be cached in a folder of each test; machine code stays where the user has it."""
+    """Cache findings in a folder of the test; machine code stays in the user's cache."""
     folder = tmp_path_factory.mktemp("findings")
     monkeypatch.setattr("osimlite.lint.many.user_cache_folder", lambda: folder)
     return folder

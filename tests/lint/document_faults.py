@@ -1,4 +1,4 @@
-"""Faults at random in documents: their names, values, times, tags and versions."""
+"""Random faults in XML documents: names, values, times, tags and versions."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from tests.lint.projects import NUMBER, Change, Project, misspelt
 from tests.oracle.structural_edits import Element, Text
 
 _WORD = re.compile(r"""[^\s<>"']+""")
-# Objects whose own name is that of something else.
+# Objects whose name attribute is the name of another component.
 _NAMES_SOMETHING = ("IKMarkerTask", "IKCoordinateTask", "BodyScale", "ControlLinear", "MocoWeight")
 
 
@@ -35,14 +35,24 @@ def _put(
     file: str, text: Text, what: str, *changes: tuple[int, int, str], around: Element | None = None,
     words: tuple[str, ...] = (), sure: bool = False,
 ) -> Change:  # fmt: skip
-    """Pieces of a document replaced."""
+    """Return a change that replaces pieces of a document.
+
+    Args:
+        file: name of the file.
+        text: its text.
+        what: description of the change.
+        *changes: start, end and new text of each piece.
+        around: element that is changed; a finding may also stand at its parent or grandparent.
+        words: names that the change is about.
+        sure: whether the change is a fault in every project.
+    """
     lines = set()
     shift = 0
     for start, end, new in sorted(changes):
         first = text.text.count("\n", 0, start) + 1 + shift
         lines |= set(range(first, first + new.count("\n") + 1))
         shift += new.count("\n") - text.text.count("\n", start, end)
-    # What an object lacks may be told of it, or of what it is a part of.
+    # A property that an object lacks may be reported at the object or at its owner.
     for _ in range(2):
         if around is not None and around.parent >= 0:
             around = text.elements[around.parent]
@@ -60,7 +70,12 @@ def new_value(
 def _reference(
     project: Project, draw: random.Random
 ) -> tuple[str, Text, int, int, str, str] | None:
-    """A word of a document that names something in the model or in a table."""
+    """Choose a word of a document that names something in the model or in a table.
+
+    Returns:
+        The file, its text, start and end of the word, the word, and the tag of its element; None if
+            the document has no such word.
+    """
     name, text = _document(project, draw)
     known = set(project.names)
     result: dict[str, list[tuple[int, int]]] = {}
@@ -95,7 +110,7 @@ def name_misspelt(project: Project, draw: random.Random) -> Change | None:
         return None
     name, text, start, end, old, tag = place
     new = misspelt(draw, old)
-    # OpenSim takes one slash for many.
+    # OpenSim treats repeated slashes as one.
     is_known = (
         new in project.names
         or re.sub("/+", "/", new).rstrip("/") in ("", old)
@@ -143,7 +158,7 @@ def path_for_a_name(project: Project, draw: random.Random) -> Change | None:
 
 
 def name_in_the_model(project: Project, draw: random.Random) -> Change | None:
-    """What a setup names is called otherwise in the model."""
+    """Rename a component in the model to which a setup refers."""
     place = _reference(project, draw)
     if place is None or place[4] not in project.components:
         return None
@@ -173,7 +188,8 @@ def text_for_a_number(project: Project, draw: random.Random) -> Change | None:
     words = leaf[1].inside(leaf[2]).split()
     at = draw.randrange(len(words))
     words[at] = draw.choice(_TEXT_FOR_NUMBER)
-    # Of lists a comma parts the numbers; frames that joints do not need are called by a number.
+    # In a list a comma separates numbers, and an unknown frame is no error where joints do not need
+    # it.
     is_other = words[at] == "1,5" or leaf[2].tag in ("wrt_body", "express_body")
     return new_value(*leaf, " ".join(words), sure=not is_other)
 
@@ -200,7 +216,7 @@ def count_of_numbers(project: Project, draw: random.Random) -> Change | None:
 
 
 def times(project: Project, draw: random.Random) -> Change | None:
-    """Times that are reversed, outside the data, none at all."""
+    """Make times reversed, outside of the data, or missing."""
     name, text = _document(project, draw)
     result: dict[str, list[Element]] = {
         tag: text.leaves[tag]
@@ -230,7 +246,7 @@ def times(project: Project, draw: random.Random) -> Change | None:
         draw.choice(["NaN", {"initial_time": "60", "final_time": "-60"}[leaf.tag]]),
         sure=True,
     )
-    # It takes two to be in the wrong order.
+    # The order of times is wrong because of both of them, so the finding may be on either line.
     both = [
         text.text.count("\n", 0, other.head) + 1
         for other in (leaf, *text.siblings(leaf))
@@ -244,7 +260,8 @@ def wrong_bool(project: Project, draw: random.Random) -> Change | None:
     if leaf is None:
         return None
     new = draw.choice(("yes", "no", "True", "TRUE", "1", "0", "flase", "tru", "on"))
-    # What is no truth is false, as it was, where isDisabled was not taken for text.
+    # OpenSim reads an invalid boolean as false, which may be the old value. In isDisabled, of old
+    # versions, such a word is no sure fault.
     return new_value(
         *leaf, new, sure=new not in ("True", "TRUE", "1", "0") and leaf[2].tag != "isDisabled"
     )
@@ -260,7 +277,10 @@ def other_bool(project: Project, draw: random.Random) -> Change | None:
 
 
 def word_misspelt(project: Project, draw: random.Random) -> Change | None:
-    """A word of a property that is no number and no name of the model: of a list of choices, mostly."""
+    """Misspell a word that is neither a number nor a name of the model.
+
+    Most of these words are options from a fixed list.
+    """
     leaf = leaf_like(
         project, draw, lambda text: bool(text) and not _is_numeric(text) and text not in ("true", "false")
         and text not in project.names and text not in project.texts,
@@ -285,7 +305,7 @@ def _retagged(
     if text.text[element.tail : element.tail + 2] == "</":
         changes.append((element.tail + 2, element.tail + 2 + len(element.tag), new))
     change = _put(name, text, what, *changes, around=element, sure=sure)
-    # Of two with one tag it is the second that is one too many.
+    # If a tag occurs twice, the second element is the superfluous one.
     twins = [
         text.text.count("\n", 0, other.start) + 1
         for other in text.siblings(element)
@@ -396,7 +416,7 @@ def version(project: Project, draw: random.Random) -> Change | None:
         (*match.span(1), new),
         sure=new in ("abc", "4.0"),
     )
-    # What a document of another version says is another thing anywhere.
+    # In a document of another version every line may have another meaning.
     return (
         change if change.sure else change._replace(lines=tuple(range(1, text.text.count("\n") + 2)))
     )

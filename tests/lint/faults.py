@@ -1,6 +1,6 @@
-"""Single faults put into the walker's file, with what the validator must say about each and in which line.
+"""Single faults in the text of the walker, with the code and the line that the linter must report.
 
-What OpenSim 4.6 does with each was measured: half of them pass without a word.
+What OpenSim 4.6 does with each was measured: it accepts half of them without a message.
 """
 
 from __future__ import annotations
@@ -10,11 +10,14 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 Change = Callable[[str], tuple[str, int | None]]
-"""From the walker's text to the faulty text and the offset of the fault in it; None: no position to hold it to."""
+"""Function from the walker's text to the faulty text and the offset of the fault in it.
+
+The offset is None where the finding has no particular position.
+"""
 
 
 class Fault(NamedTuple):
-    """A fault: what it does to the text, the code that must be found there, and its severity."""
+    """Fault: its change of the text, the code that must be reported, and its severity."""
 
     name: str
     change: Change
@@ -23,7 +26,10 @@ class Fault(NamedTuple):
 
 
 def put(marker: str, old: str, new: str, at: str | None = None) -> Change:
-    """Behind `marker`, replace the next `old` by `new`; the fault is where `at` (or all of it) stands in `new`."""
+    """Return a change that replaces the next `old` after `marker` by `new`.
+
+    The fault is at the position of `at` in `new`, or at the beginning of `new`.
+    """
 
     def change(text: str) -> tuple[str, int]:
         start = text.index(old, text.index(marker))
@@ -34,7 +40,10 @@ def put(marker: str, old: str, new: str, at: str | None = None) -> Change:
 
 
 def each(*pairs: tuple[str, str], at: str) -> Change:
-    """Replace every occurrence of each pair; the fault is at the last `at` in the result."""
+    """Return a change that replaces every occurrence of each pair.
+
+    The fault is at the last `at` in the result.
+    """
 
     def change(text: str) -> tuple[str, int]:
         for old, new in pairs:
@@ -46,7 +55,10 @@ def each(*pairs: tuple[str, str], at: str) -> Change:
 
 
 def pattern(expression: str, new: str, at: str, behind: str = "") -> Change:
-    """Replace the first match of an expression; the fault is at `at`, behind `behind`, in the result."""
+    """Return a change that replaces the first match of a regular expression.
+
+    The fault is at the first `at` after `behind` in the result.
+    """
 
     def change(text: str) -> tuple[str, int]:
         text, count = re.subn(expression, new, text, count=1, flags=re.DOTALL)
@@ -57,12 +69,12 @@ def pattern(expression: str, new: str, at: str, behind: str = "") -> Change:
 
 
 def nowhere(edit: Callable[[str], str]) -> Change:
-    """An edit after which the fault has no place of its own."""
+    """Return a change whose fault has no particular position."""
     return lambda text: (edit(text), None)
 
 
 def value(tag: str, new: str, marker: str = '<Body name="RightShank">') -> Change:
-    """Give the next property `tag` behind `marker` another text."""
+    """Return a change that gives the next property `tag` after `marker` another text."""
 
     def change(text: str) -> tuple[str, int]:
         start = text.index(f"<{tag}>", text.index(marker))
@@ -74,7 +86,7 @@ def value(tag: str, new: str, marker: str = '<Body name="RightShank">') -> Chang
 
 
 def tag(old: str, new: str, marker: str) -> Change:
-    """Rename the next element `old` behind `marker`, both tags."""
+    """Return a change that renames the next element `old` after `marker`, in both of its tags."""
 
     def change(text: str) -> tuple[str, int]:
         start = re.compile(rf"<{re.escape(old)}(?=[\s>/])").search(text, text.index(marker))
@@ -513,4 +525,4 @@ VALID = {
     "mass_leading_plus": value("mass", "+2.5e0"),
     "vec3_newlines_tabs": value("location", "\n0\t-0.2175\n0\n", FOOT),
 }
-"""Spellings that look odd and are right."""
+"""Unusual spellings that OpenSim accepts."""

@@ -1,7 +1,7 @@
-"""Faults that can be put into any model, of any version, for comparisons of verdicts with OpenSim.
+"""Faults that can be made in any model of any version, to compare verdicts with OpenSim.
 
-The faults of `tests.lint.faults` name objects of the walker. Those of this module look for the last
-object of a kind, so that two of them meet in one object as often as not.
+The faults of `tests.lint.faults` name objects of the walker. Those of this module change the last
+object of a kind, so that two of them often concern the same object.
 """
 
 from __future__ import annotations
@@ -11,7 +11,10 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 Change = Callable[[str], str]
-"""From the text of a model to the faulty text; `ValueError` where the model has nothing to change."""
+"""Function from the text of a model to the faulty text.
+
+It raises `ValueError` if the model has nothing to change.
+"""
 
 PARAMETERS = (
     "stiffness|radius|max_isometric_force|optimal_fiber_length|tendon_slack_length|optimal_force|"
@@ -21,7 +24,7 @@ FLAGS = "locked|clamped|prescribed|isDisabled|appliesForce|isEnforced|compute_en
 
 
 class GeneralFault(NamedTuple):
-    """A fault and its name."""
+    """Fault with its name and its change of the text."""
 
     name: str
     change: Change
@@ -31,7 +34,7 @@ def find_last(expression: str, text: str) -> re.Match[str]:
     """Return the last match of an expression.
 
     Raises:
-        ValueError: there is none.
+        ValueError: the text has no match.
     """
     matches = list(re.finditer(expression, text, re.DOTALL))
     if not matches:
@@ -51,12 +54,12 @@ def write_value(tags: str, new: str | Callable[[str], str]) -> Change:
 
 
 def take_out(expression: str) -> Change:
-    """Return a change that takes the last match of an expression out."""
+    """Return a change that removes the last match of an expression."""
     return replace_last(expression, "")
 
 
 def replace_last(expression: str, new: str) -> Change:
-    """Return a change that writes a template in the place of the last match of an expression."""
+    """Return a change that replaces the last match of an expression by a template."""
 
     def change(text: str) -> str:
         match = find_last(expression, text)
@@ -84,7 +87,7 @@ def name_objects(kind: str, text: str) -> list[str]:
     """Return the names of the objects whose tag matches an expression.
 
     Raises:
-        ValueError: there is none.
+        ValueError: the text has no such object.
     """
     names = re.findall(rf'<(?:{kind}) name="([^"]+)"', text)
     if not names:
@@ -93,7 +96,7 @@ def name_objects(kind: str, text: str) -> list[str]:
 
 
 def write_reference(kind: str, new: Callable[[str], str]) -> Change:
-    """Return a change that writes the last reference to an object of a kind in another way."""
+    """Return a change that writes the last reference to an object of a kind in another form."""
 
     def change(text: str) -> str:
         names = "|".join(map(re.escape, name_objects(kind, text)))
@@ -104,7 +107,7 @@ def write_reference(kind: str, new: Callable[[str], str]) -> Change:
 
 
 def rename_last(kind: str, edit: Callable[[str], str]) -> Change:
-    """Return a change that renames the last object of a kind, and all that refers to it."""
+    """Return a change that renames the last object of a kind together with all references to it."""
 
     def change(text: str) -> str:
         name = name_objects(kind, text)[-1]

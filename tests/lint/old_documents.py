@@ -1,4 +1,4 @@
-"""Old documents, most with something that OpenSim's own upgrade fails over."""
+"""Documents of old versions; most have content on which OpenSim's own upgrade fails."""
 
 from __future__ import annotations
 
@@ -240,7 +240,7 @@ CASES: dict[str, tuple[str, str, str]] = {
     "no connectors": (YEARS_BETWEEN, "connectors>", "Connectors>"),
 }
 
-# What OpenSim 4.6 takes; tests/oracle/test_lint_old_formats.py asks it.
+# Cases that OpenSim 4.6 accepts; tests/oracle/test_lint_old_formats.py verifies this.
 TAKEN = frozenset((
     "<ControlLinear><default_max>NaN</default_max></ControlLinear>",
     "<ControlLinear><default_max>-inf</default_max></ControlLinear>",
@@ -267,7 +267,8 @@ TAKEN = frozenset((
     "connector twice, first wrong",
 ))  # fmt: skip
 
-# Both as they are, and the second in the first version whose joints are outside of bodies.
+# The documents without changes, and the second one in the first version whose joints are outside of
+# bodies.
 SOUND = OLD, YEARS_BETWEEN, YEARS_BETWEEN.replace("30502", "30501")
 
 

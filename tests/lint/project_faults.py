@@ -1,4 +1,4 @@
-"""Single faults at random in whole projects, and changes that change nothing."""
+"""Random single faults in complete projects, and changes without any effect."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ KINDS: tuple[Callable[[Project, random.Random], Change | None], ...] = (
     tables.header_key, tables.header_value, tables.label, tables.column_gone, tables.columns_swapped, tables.cell,
     tables.row, tables.time, tables.cut_off, tables.other_units,
 )  # fmt: skip
-"""Kinds of faults."""
+"""Functions that make one kind of fault each."""
 
 UNKNOWABLE = {
     "number_out_of_range": "the number may be one that is meant",
@@ -84,11 +84,11 @@ UNKNOWABLE = {
     "other_units": "values that are possible in them too",
     "version": "a document may be of any version",
 }
-"""Why faults of these kinds, unless they are sure, may leave a project in which nothing shows that it was another."""
+"""Why a fault of these kinds, unless it is sure, may leave a project that is still valid."""
 
 
 def faults(project: Project, draw: random.Random) -> Iterator[Fault]:
-    """Faults without end."""
+    """Yield random faults without end."""
     while True:
         kind = draw.choice(KINDS)
         change = kind(project, draw)
@@ -108,7 +108,7 @@ def faults(project: Project, draw: random.Random) -> Iterator[Fault]:
 
 
 def harmless(project: Project, draw: random.Random) -> Iterator[Fault]:
-    """Changes without end that change nothing for OpenSim."""
+    """Yield random changes that have no effect in OpenSim, without end."""
     while True:
         name = draw.choice(sorted({*project.documents, *project.tables}))
         text = project.texts[name]
@@ -142,7 +142,7 @@ def _same_document(text: Text, draw: random.Random) -> tuple[str, str]:
         return what, text.text.replace("\t", "")
     if what == "double quotes":
         return "single quotes", re.sub(r'(name|Version)="([^"]*)"', r"\1='\2'", text.text)
-    # Properties of an object have no order; objects of a set do.
+    # The order of properties has no meaning, but the order of objects in a set does.
     siblings = [other for other in text.siblings(element) if other.tag != element.tag]
     others = [o for o in siblings if o.end <= element.start or o.start >= element.end]
     if element.tag[0].isupper() or not others:

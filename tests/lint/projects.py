@@ -1,8 +1,7 @@
-"""Single faults at random in whole projects: a model with the setups and the tables that fit it.
+"""Projects for random faults: a model with setups and tables that fit it.
 
-A fault knows the lines in which it may be found: those that it changes, and those of other files
-that name what it changes. It is `sure` if it is a fault whatever the project is; of the others
-OpenSim must say whether they are.
+A fault knows the lines in which it may be reported: those that it changes, and those of other files
+that refer to them. It is `sure` if it is a fault in every project; for the others OpenSim decides.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ _NAMED = re.compile(r'<(\w+) name="([^"]+)"')
 
 
 class Fault(NamedTuple):
-    """What is done to a project: the files that it changes (None: taken away), and where it may be found."""
+    """Fault in a project, with the changed files (None for a missing file) and where it may be reported."""
 
     kind: str
     what: str
@@ -36,7 +35,7 @@ class Fault(NamedTuple):
 
 
 class Change(NamedTuple):
-    """A changed text of a file, with the lines of it, and the words, that the change is about."""
+    """Changed text of one file, with the lines and words that the change concerns."""
 
     file: str
     what: str
@@ -47,7 +46,7 @@ class Change(NamedTuple):
 
 
 class Table:
-    """The lines of a table."""
+    """Lines of a table, and the positions of its labels and rows."""
 
     def __init__(self, name: str, text: str) -> None:
         self.name = name
@@ -72,7 +71,7 @@ class Table:
 
 
 class Project:
-    """The texts of a folder by file, and what connects them."""
+    """Texts of all files of a folder, and the references between them."""
 
     def __init__(self, texts: dict[str, str]) -> None:
         self.texts = texts
@@ -93,7 +92,11 @@ class Project:
         )
 
     def users(self, file: str) -> dict[str, int]:
-        """Every document that names a file, or names one that names it, with the line."""
+        """Return the line of each document that names a file, directly or through other documents.
+
+        Returns:
+            Line numbers by the name of the document.
+        """
         result: dict[str, int] = {}
         for name, document in self.documents.items():
             for line, text in enumerate(document.text.split("\n"), 1):
@@ -105,7 +108,7 @@ class Project:
         return result
 
     def places_of(self, word: str) -> set[Place]:
-        """Every line of a document that names something."""
+        """Return the lines of all documents that contain a name."""
         whole = re.compile(rf"""(?<![^\s<>"'/]){re.escape(word)}(?![^\s<>"'/.])""")
         return {
             (name, line)
@@ -127,12 +130,12 @@ _MISSPELT: tuple[Callable[[random.Random, str], str], ...] = (
 
 
 def misspelt(draw: random.Random, word: str) -> str:
-    """A word with a letter lost, doubled, changed, or in the other case."""
+    """Return a word with a letter dropped, repeated, replaced, or in another case."""
     return draw.choice(_MISSPELT)(draw, word)
 
 
 def walking() -> Project:
-    """Gait: scaling, inverse kinematics, inverse dynamics, analyses, residual reduction, muscle control."""
+    """Return a gait project with scaling, IK, inverse dynamics, analyses, RRA and CMC."""
     texts = {
         file.name: file.read_text()
         for folder in ("setups", "pipelines/walking")
@@ -146,7 +149,7 @@ def walking() -> Project:
 
 
 def pendulum() -> Project:
-    """A double pendulum with sensors: they are placed, and followed; a Moco study."""
+    """Return a project of a double pendulum with placed sensors, their tracking, and a Moco study."""
     return Project(
         {
             file.name: file.read_text()

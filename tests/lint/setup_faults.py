@@ -1,8 +1,8 @@
-"""One fault at a time in a pipeline that is without any, each of which OpenSim 4.6 was asked about.
+"""Single faults in a correct pipeline, each of which was tried with OpenSim 4.6.
 
-The numbers are those of the table of faults (``oracle/tools/setup_faults.json`` of the reference
-data), which says what OpenSim does with each: it raises, crashes, hangs, logs a line, or gives
-other results without a word.
+The numbers refer to the table of faults (``oracle/tools/setup_faults.json`` of the reference data).
+It says what OpenSim does with each fault: it raises an exception, crashes, hangs, logs a line, or
+computes other results without a message.
 """
 
 from __future__ import annotations
@@ -18,9 +18,10 @@ TEXTS["model.osim"] = gzip.decompress((SETUPS / "model.osim.gz").read_bytes()).d
 
 
 class Fault(NamedTuple):
-    """Replace a text of a file by another. The finding is in the line where that is, or where another text is.
+    """Fault that replaces one text of a file by another.
 
-    What else is changed is told before it.
+    The finding is expected in the file `found_in` (default: the changed file), on the line with the
+    text `line_of` (default: the changed line). The changes `also` to other files are made first.
     """
 
     number: int | str
@@ -33,40 +34,52 @@ class Fault(NamedTuple):
 
 
 def line(name: str, beginning: str) -> str:
-    """The line of a file that begins so."""
+    """Return the first line of a file that begins with a text."""
     return next(row for row in TEXTS[name].splitlines() if row.lstrip().startswith(beginning))
 
 
 def rows(name: str) -> list[str]:
-    """The rows of a table."""
+    """Return the data rows of a table."""
     return [row for row in TEXTS[name].splitlines() if row[:1].isdigit()][name == "walk.trc" :]
 
 
 def cell(name: str, row: int, column: int, new: str) -> tuple[str, str, str]:
-    """A cell of a table replaced."""
+    """Replace one cell of a table.
+
+    Returns:
+        File, old text and new text, as in `Fault.also`.
+    """
     old = rows(name)[row]
     cells = old.split("\t")
     return name, f"\n{old}\n", "\n" + "\t".join([*cells[:column], new, *cells[column + 1 :]]) + "\n"
 
 
 def without(name: str, *beginnings: str) -> tuple[str, str, str]:
-    """A line taken out."""
+    """Remove a line of a file.
+
+    Returns:
+        File, old text and new text, as in `Fault.also`.
+    """
     return name, line(name, beginnings[0]) + "\n", ""
 
 
 def part(name: str, pattern: str) -> str:
-    """The first part of a file that is so."""
+    """Return the first match of a pattern in a file."""
     return next(re.finditer(pattern, TEXTS[name], re.DOTALL))[0]
 
 
 def unseen(row: int, new: str) -> tuple[str, str, str]:
-    """The second marker replaced in a row."""
+    """Replace the second marker in a row of the marker file.
+
+    Returns:
+        File, old text and new text, as in `Fault.also`.
+    """
     cells = rows("walk.trc")[row].split("\t")
     return "walk.trc", "\t".join(cells), "\t".join([*cells[:5], new, new, new, *cells[8:]])
 
 
 def swapped(one: str, other: str) -> str:
-    """The line of labels with two of them swapped."""
+    """Return the line of marker labels with two labels exchanged."""
     labels = TEXTS["walk.trc"].splitlines()[3].split("\t")
     return "\t".join({one: other, other: one}.get(label, label) for label in labels)
 
@@ -91,7 +104,7 @@ VALUE = '<MocoVariableInfo name="/slider/position/value"'
 
 
 def parameter(path: str, name: str, element: int | None = None) -> str:
-    """A parameter of a study, and the goals after it."""
+    """Return a MocoParameter and the beginning of the goals after it."""
     more = "" if element is None else f"<property_element>{element}</property_element>"
     return (
         '<parameters><MocoParameter name="p"><MocoBounds><bounds>1 3</bounds></MocoBounds>'
@@ -101,7 +114,7 @@ def parameter(path: str, name: str, element: int | None = None) -> str:
 
 
 def pair(kind: str, first: str, last: str) -> str:
-    """A goal that makes two variables equal."""
+    """Return a periodicity goal for two variables."""
     return (
         f'<MocoPeriodicityGoal name="o"><{kind}_pairs><MocoPeriodicityGoalPair><initial_variable>{first}'
         f"</initial_variable><final_variable>{last}</final_variable></MocoPeriodicityGoalPair></{kind}_pairs>"
@@ -110,7 +123,7 @@ def pair(kind: str, first: str, last: str) -> str:
 
 
 def constraint(tag: str, text: str) -> str:
-    """A constraint of a study after its goals."""
+    """Return a path constraint that follows the goals of a study."""
     return f'</goals><path_constraints><{tag} name="d">{text}</{tag}></path_constraints>'
 
 
@@ -144,7 +157,7 @@ GROUPED = (
 )
 
 FAULTS = [
-    # Any setup
+    # Setups of any tool
     Fault(1, "ik.xml", "every:InverseKinematicsTool", "AnalyzeTool"),
     Fault(5, "ik.xml", 'Version="40600"', 'Version="20201"', "", "<InverseKinematicsTool"),
     Fault(0, "ik.xml", "<InverseKinematicsTool>", "<InverseKinemtaticsTool>"),
@@ -472,7 +485,7 @@ FAULTS = [
     Fault(323, "slide.omoco", "<bounds>-5 5", "<bounds>-5 0 5"),
     Fault(324, "slide.omoco", "every:MocoStudy", "MocoStudie"),
 ]  # fmt: skip
-"""Faults that are found, by their numbers in the table."""
+"""Faults that the linter finds, by their numbers in the table."""
 
 STUDIES = [
     Fault("bounds at the start", "slide.omoco", "<initial_bounds>0", "<initial_bounds>7"),
@@ -516,7 +529,7 @@ STUDIES = [
     Fault("mode", "slide.omoco", "<weight>0.001<", "<mode>costs</mode><weight>0.001<"),
     Fault("exponent", "slide.omoco", "<weight>0.001<", "<exponent>1</exponent><weight>0.001<"),
 ]  # fmt: skip
-"""More that OpenSim refuses in a study."""
+"""Further faults for which OpenSim rejects a study."""
 
 HARMLESS = [
     Fault(
@@ -556,7 +569,10 @@ HARMLESS = [
         258, "scale.xml", "<preserve_mass_distribution>true", "<preserve_mass_distribution>false"
     ),
 ]
-"""What OpenSim takes, with the same results; or that is for a user to choose (301: forces of a group do not act)."""
+"""Changes that OpenSim accepts with the same results, or that the user may choose.
+
+In fault 301 the forces of a group are disabled.
+"""
 
 UNTOLD = {
     19: "there is no file; the program says so",
@@ -566,11 +582,11 @@ UNTOLD = {
     328: "the folder that OpenSim runs in is another",
     329: "the folder that OpenSim runs in is another",
 }
-"""What the files do not tell."""
+"""Faults that cannot be seen in the files, and why."""
 
 
 def put_in(folder: Path, fault: Fault) -> int:
-    """Change the file, and return the line of the change."""
+    """Write a fault into its files and return the number of the changed line."""
     for name, old, new in fault.also:
         text = (folder / name).read_text()
         assert old in text, f"'{old}' is not in {name}"

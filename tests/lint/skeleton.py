@@ -1,4 +1,4 @@
-"""Puts a few lines of a model into a small whole one, so that an example need not show what it is not about."""
+"""Insert a few lines of a model into a small complete model, so that examples show only what they are about."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from osimlite.schema.registry import find_class
 
 FIXTURES = Path(__file__).resolve().parents[2] / "fixtures" / "lint"
 SKELETON, LIMB = FIXTURES / "skeleton.osim", FIXTURES / "limb.osim"
-"""A leg; and the same with a foot, wraps, paths and muscles, for lines about a part of these."""
+"""Models of a leg; LIMB also has a foot, wrap objects, paths and muscles."""
 
 
 def document(fragment: str) -> str:
-    """The skeleton with the elements of `fragment` in place.
+    """Return the small model with the elements of `fragment` inserted.
 
-    An element takes the place of the first with its tag and, if it has one, its name; of what only
-    the limb has, it keeps what `fragment` does not give. A new member is put at the end of its set,
-    all else at the end of the model.
+    An element replaces the first one with its tag and, if it has one, its name. An element that
+    only LIMB has keeps the properties that `fragment` does not state. A new member is added at the
+    end of its set, anything else at the end of the model.
     """
     text = SKELETON.read_text(encoding="utf-8")
     wrapped = Source(f"<_>{fragment}</_>".encode())
@@ -30,7 +30,7 @@ def document(fragment: str) -> str:
     if any(
         span.end == span.tag_end and not wrapped.text[: span.end].endswith("/>") for span in spans
     ):
-        # Not closed: take it as it stands.
+        # Insert an element without end tag as it is.
         return _placed(text, wrapped, tops[0], len(wrapped.text) - 4)
     limb = LIMB.read_text(encoding="utf-8")
     of_limb = [
@@ -49,7 +49,7 @@ def document(fragment: str) -> str:
 
 
 def _found(text: str, wrapped: Source, number: int) -> int | None:
-    """The element of a text that has the tag and name of another."""
+    """Return the number of the element of a text with the tag and name of another element, or None."""
     span = wrapped.spans[number]
     name = re.search(r'\sname="[^"]*"', wrapped.text[span.start : span.tag_end])
     for result, other in enumerate(Source(text.encode()).spans):
@@ -78,7 +78,7 @@ def _placed(text: str, wrapped: Source, number: int, end: int) -> str:
 
 
 def _within(text: str, wrapped: Source, number: int, child: int) -> str:
-    """A text whose element that is like another has a child of that one, in place of its own with that tag."""
+    """Insert a child into the corresponding element of a text, in place of a child with the same tag."""
     source, span = Source(text.encode()), wrapped.spans[child]
     result = _found(text, wrapped, number)
     assert result is not None

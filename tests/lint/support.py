@@ -1,4 +1,4 @@
-"""Models, data and comparisons that several test modules of this package share."""
+"""Folder with a project for tests of random faults."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tests.lint.projects import Fault, Project
 
 
 class Folder:
-    """A project in files, in which one may be changed at a time."""
+    """Folder with the files of a project, in which a test changes one fault at a time."""
 
     def __init__(self, path: Path, project: Project) -> None:
         self.path = path
@@ -23,7 +23,7 @@ class Folder:
         self.now = 0
 
     def check(self, *files: str) -> list[Finding]:
-        """What is found in files, of those that are there."""
+        """Return the findings in those of the files that exist."""
         return [
             f
             for name in files
@@ -32,7 +32,8 @@ class Folder:
         ]
 
     def put(self, texts: dict[str, str | None]) -> None:
-        # Files of one length that are written within one tick of the clock look the same.
+        # The cache recognises files by size and time. Files of equal size that are written within
+        # one tick of the clock would look unchanged.
         self.now += 1
         for name, text in texts.items():
             if text is None:
@@ -42,18 +43,18 @@ class Folder:
                 os.utime(self.path / name, (self.now, self.now))
 
     def found(self, fault: Fault) -> list[Finding]:
-        """What is found in the project with a fault: in the file that it changes, and in those that use it."""
+        """Return the findings with a fault, in the file that it changes and in the files that refer to it."""
         self.put(fault.texts)
         files = {fault.file, *self.project.users(fault.file), *(file for file, _ in fault.places)}
         try:
-            # Of the model, whose meshes are not there, what is wrong with its text.
+            # Ignore missing mesh files, which the project does not contain.
             return [f for f in self.check(*sorted(files)) if f.code != "OSIM701"]
         finally:
             self.put({name: self.project.texts[name] for name in fault.texts})
 
 
 def in_place(fault: Fault, findings: list[Finding]) -> list[Finding]:
-    """The findings that are where the fault is."""
+    """Return the findings at a position where the fault may be reported."""
     return [f for f in findings if (Path(str(f.file)).name, f.line) in fault.places]
 
 

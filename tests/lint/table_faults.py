@@ -1,4 +1,4 @@
-"""Faults at random in tables: their headers, labels, rows and times."""
+"""Random faults in tables: headers, labels, rows and times."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def _head_lines(table: Table) -> tuple[int, ...]:
 
 
 def header_key(project: Project, draw: random.Random) -> Change | None:
-    """A key of the header that is misspelt or missing."""
+    """Misspell or remove a key of the header."""
     table = _table(project, draw)
     if table.is_markers:
         keys = table.cells(1)
@@ -66,7 +66,7 @@ def header_value(project: Project, draw: random.Random) -> Change | None:
         if value.isdecimal()
         else ()
     )
-    # The other of yes and no is another project: see other_units.
+    # Exchanging yes and no makes another valid project, see `other_units`.
     units = ("no", "yes", "YES") if key != "inDegrees" else ()
     new = draw.choice((*numbers, *units, "", "true", "double", "Vec3", "1 2"))
     text = table.with_lines(at, f"{key}={new}")
@@ -80,7 +80,7 @@ def header_value(project: Project, draw: random.Random) -> Change | None:
 
 
 def _used_labels(project: Project, table: Table) -> list[int]:
-    """The columns that a setup needs."""
+    """Return the indices of the columns that a setup uses."""
     components = set() if table.is_markers else set(project.components)
     return [
         k
@@ -104,7 +104,7 @@ def label(project: Project, draw: random.Random) -> Change | None:
          "", f"{old}/value")
     )  # fmt: skip
     text = table.with_cells(table.label_line, [*table.labels[:at], new, *table.labels[at + 1 :]])
-    # Of what only its beginning is asked for, the last letter may be another.
+    # If a setup uses only the beginning of a label, a change of its last letter may be no fault.
     asked = old if project.places_of(old) or old in project.components else old[:-1]
     is_known = (new in project.names and new not in others) or new.startswith(asked)
     return Change(
@@ -129,7 +129,7 @@ def column_gone(project: Project, draw: random.Random) -> Change | None:
     old = table.labels[at]
     text = _columns(table, lambda cells: cells[:at] + cells[at + 1 :])
     text = text.replace(f"nColumns={len(table.labels)}", f"nColumns={len(table.labels) - 1}")
-    # A study may follow fewer columns.
+    # A Moco study may track fewer columns.
     return Change(
         table.name,
         f"no column {old!r}",
@@ -218,7 +218,7 @@ def time(project: Project, draw: random.Random) -> Change | None:
 
 
 def cut_off(project: Project, draw: random.Random) -> Change | None:
-    """The end of a file is lost."""
+    """Cut off the end of a file."""
     name = draw.choice(sorted({*project.tables, *project.documents}))
     text = project.texts[name]
     kept = text[: draw.randrange(len(text) // 20, len(text) - 5)]
@@ -233,7 +233,7 @@ def cut_off(project: Project, draw: random.Random) -> Change | None:
 
 
 def other_units(project: Project, draw: random.Random) -> Change | None:
-    """All numbers of a table but the times in other units, or other units of the same numbers."""
+    """Convert all numbers of a table except for times to other units, or change only the stated unit."""
     table = _table(project, draw)
     lines, labels = tuple(range(1, len(table.lines) + 1)), table.labels[1:]
     words = tuple(filter(None, (*labels, *(label[:-1] for label in labels))))

@@ -1,4 +1,4 @@
-"""The ways into other repositories: the pre-commit hook, the GitHub Action, and the guide to them."""
+"""Check the integration into other repositories: pre-commit hook, GitHub Action, and their guide."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def act(
 
 
 def checked(done: subprocess.CompletedProcess[str]) -> list[str]:
-    """The files that the action found something in."""
+    """Return the files with findings in the output of the action."""
     return sorted(set(re.findall(r",file=([^,]+),", done.stdout)))
 
 
@@ -159,7 +159,7 @@ def test_what_the_action_does_not_find_fails_it(repo: Path, tmp_path: Path, path
 
 @on_bash
 def test_the_action_executes_nothing_of_what_was_checked_out(repo: Path, tmp_path: Path) -> None:
-    """Whatever the program imports could lie there: modules of it, of its libraries, of Python itself."""
+    """The folder has modules with the names of osimlite, of its libraries, and of Python's own modules."""
     for name in ("osimlite", "lxml", "pip", "typer", "multiprocessing", "json", "sitecustomize"):
         (tmp_path / f"{name}.py").write_text("print('executed'); raise SystemExit(0)")
         (tmp_path / name).mkdir()

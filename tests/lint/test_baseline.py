@@ -1,4 +1,4 @@
-"""Baselines count findings that are alike, and know them by what they say, not by their lines."""
+"""Check baselines: they count equal findings, and recognise them by message instead of line."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def test_as_many_findings_as_before_are_known(baseline: Path) -> None:
     for count, new in ((1, 0), (2, 0), (3, 1), (5, 3)):
         report = Report([finding(line=10 * number) for number in range(count)])
         left = subtract_baseline(baseline, report)
-        # The last ones are the new ones.
+        # The additional findings are the last ones.
         assert left.findings == report.findings[count - new :]
         assert left.known == count - new
 
@@ -38,7 +38,7 @@ def test_what_is_not_alike_is_new(baseline: Path, other: Finding) -> None:
 
 
 def test_the_code_of_a_group_knows_its_faults(baseline: Path) -> None:
-    """As baselines have it that were written before rules were groups."""
+    """Baselines from before rules became groups have the code of the group for all its faults."""
     write_baseline(baseline, Report([finding("OSIM606"), finding("OSIM606b")]))
     report = Report([finding("OSIM606a"), finding("OSIM606b"), finding("OSIM606c")])
     left = subtract_baseline(baseline, report)

@@ -1,4 +1,4 @@
-"""Every reason for which the builder refuses a model is reported by a rule."""
+"""Check that a rule reports every reason for which the builder rejects a model."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ BAND = path_of(("/ground", "0 1 0"), ("/bodyset/a", "0 0 0"))
 
 
 def _obstacle_of(name: str, hint: str = "") -> str:
-    """Return an obstacle of a path."""
+    """Return an obstacle of a path, which refers to a contact geometry."""
     return (
         f'<Scholz2015GeometryPathObstacle name="o{name}"><socket_contact_geometry>/contactgeometryset/{name}'
         f"</socket_contact_geometry>{hint}</Scholz2015GeometryPathObstacle>"
@@ -111,7 +111,7 @@ MODELS = {
     ),
     "an unknown constraint": small_model(constraints='<NoSuchConstraint name="c" />'),
 }
-"""Models for messages that no case and no fixture gives."""
+"""Models for messages that no case of `verdict_cases` and no fixture causes."""
 
 WITHOUT_MODEL = {
     "simulation/elements/builder.py": "the sum of all that is left out",
@@ -144,11 +144,11 @@ WITHOUT_MODEL = {
     "mechanics/multibody/schema_functions.py": "the reader keeps the default of an empty list",
     "mechanics/multibody/schema_joints.py": "reported by OSIM206 before",
 }
-"""Modules of which some messages need more than a small model, and what that is."""
+"""Modules with messages that no small model causes, and what causes them."""
 
 
 def messages_of(text: str | bytes, folder: Path | None = None) -> list[str]:
-    """Return the messages with which the builder refuses a model."""
+    """Return the messages with which the builder rejects a model."""
     try:
         model = read_text(text)
     except OsimliteError:

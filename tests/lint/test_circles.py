@@ -1,4 +1,4 @@
-"""Frames that rest on themselves, however their circles hang together."""
+"""Check frames that depend on themselves, in cycles of any structure."""
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -9,7 +9,7 @@ from osimlite.lint import validate
 
 @given(st.lists(st.integers(0, 7), min_size=1, max_size=8))
 def test_frames_on_a_circle_are_those_that_lead_back_to_themselves(below: list[int]) -> None:
-    """Each frame's origin is a station on another frame, or on ground."""
+    """The origin of each frame is a station on another frame, or on ground."""
     parts = "".join(
         f'<StationDefinedFrame name="f{k}"><socket_origin_point>/s{k}</socket_origin_point></StationDefinedFrame>'
         f'<Station name="s{k}"><socket_parent_frame>/{f"f{to}" if to < len(below) else "ground"}</socket_parent_frame>'

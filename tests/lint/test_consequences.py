@@ -1,4 +1,4 @@
-"""The table of what OpenSim makes of numbers outside their domain."""
+"""Check the table of consequences of numbers outside of their domain in OpenSim."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Whatever happens to a file, the answer is findings in places that exist, soon, and nothing that was read is lost.
+"""Check that damaged files give findings at valid positions within the time limit, and that no content is lost.
 
-Three hundred damaged files by default; ``OSIMLITE_DAMAGE=20000 OSIMLITE_SEED=7`` asks for others,
-and ``OSIMLITE_DAMAGE_FOLDER=...`` for more files to be damaged: all that a folder has.
+The default are three hundred damaged files; ``OSIMLITE_DAMAGE=20000 OSIMLITE_SEED=7`` sets their
+number and the seed, and ``OSIMLITE_DAMAGE_FOLDER=...`` adds all files of a folder.
 """
 
 from __future__ import annotations
@@ -139,7 +139,7 @@ WEIGHTS = [4, 6, 3, 4, 4, 2, 2, 1, 1, 1, 3]
 
 @contextmanager
 def _limited() -> Iterator[None]:
-    """An error if it takes too much of the processor's time, however many share that."""
+    """Raise an error if the code uses too much processor time, independent of other processes."""
 
     def stop(*_: object) -> None:
         raise TimeoutError
@@ -155,7 +155,11 @@ def _limited() -> Iterator[None]:
 
 @pytest.fixture(scope="module")
 def project(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[tuple[str, bytes]]]:
-    """A folder with a project, in which one file at a time is damaged, and the files that are."""
+    """Write a project in which the tests damage one file at a time.
+
+    Returns:
+        The folder, and names and contents of the files to be damaged.
+    """
     folder = tmp_path_factory.mktemp("project")
     for file in (FIXTURES / "setups").iterdir():
         data = file.read_bytes()
@@ -208,7 +212,7 @@ def check(folder: Path, name: str, data: bytes) -> None:
 
 
 def _unknown(top: Object) -> list[str]:
-    """What no class has, however an element without text is written."""
+    """Return all unknown elements of a document, with empty elements in one spelling."""
     texts = (
         re.sub(r"></[^>]*>|\s*/>", "/>", text)
         for item in top.walk()

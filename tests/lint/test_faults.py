@@ -1,4 +1,4 @@
-"""The faults that were measured with OpenSim, each found in its line; what is right is left alone."""
+"""Check that faults that were tried with OpenSim are found on their lines, and valid text is not."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_a_fault_is_found_in_its_line(fault, tmp_path):
 
 
 def test_the_table_is_whole():
-    # 129 faults were measured: 5 of them are valid, and one is a file that does not exist.
+    # OpenSim was asked about 129 changes: 5 of them are valid, and one is a missing file.
     assert len(faults.FAULTS) == 129 - 5 - 1
     assert len({fault.name for fault in faults.FAULTS}) == len(faults.FAULTS)
 

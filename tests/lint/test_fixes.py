@@ -1,4 +1,4 @@
-"""Mends: exact, and nothing else is touched."""
+"""Check fixes: they are exact, and change nothing else."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def test_a_value_that_changes_is_an_unsafe_mend(name, expected):
 @pytest.mark.parametrize("fault", faults.FAULTS, ids=lambda fault: fault.name)
 def test_no_mend_makes_a_model_worse(fault):
     text, _ = fault.change(WALKER.read_text())
-    # A model that holds together again shows where its feet are.
+    # Once a model is connected again, further rules can compute the positions of its feet.
     before = validate(Source(text.encode()), ignore="OSIM521")
     for unsafe in (False, True):
         fixed, count = mend(text, unsafe=unsafe)

@@ -1,4 +1,4 @@
-"""Characters that only look like those of a number are named."""
+"""Check messages about characters that only look like those of a number."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A joint is in gimbal lock where its three axes are in a plane, however these are turned."""
+"""Check gimbal lock: the three axes of a joint lie in one plane, in any orientation."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ SIZE = 12
 
 
 def turned_by(first: np.ndarray, second: np.ndarray, third: np.ndarray) -> osimlite.Model:
-    """A body that three rotations about these axes turn, all by nothing at first."""
+    """Return a body on a joint with three rotation axes, at zero angles."""
     names = ("a", "b", "c")
     axes = {
         f"rotation{number}": osimlite.TransformAxis(

@@ -1,4 +1,4 @@
-"""The version of OpenSim that is aimed at: what it has not is told, and nothing else."""
+"""Check the target version of OpenSim: only what this version lacks is reported."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ TABLE = json.loads((REPO / "osimlite" / "lint" / "history.json").read_text())
 def told(
     text: str, target: str, tmp_path: Path, name: str = "m.xml"
 ) -> list[tuple[int | None, str, str]]:
-    """Line, severity and message of what is said of a version."""
+    """Return line, severity and message of what OSIM113 reports for a target version."""
     path = tmp_path / name
     path.write_text(text)
     report = validate(path, config=Config(("OSIM113",), target_version=target))
@@ -70,7 +70,7 @@ def test_classes_and_properties_that_came_later_are_told_with_their_line(tmp_pat
         goal,
         *((line, bad, text.format("4.3")) for line, bad, text in properties),
     ]
-    # Of what is no longer a class nothing is said of its properties.
+    # Properties of a class that the target version lacks are not reported in addition.
     assert {line for line, _, _ in told(STUDY, "4.1", tmp_path)} == {2, 3, 5, 6}
 
 
@@ -138,7 +138,7 @@ def test_the_table_speaks_of_classes_and_properties_that_exist():
 
 @pytest.fixture
 def clone():
-    """A clone of opensim-core with its tags."""
+    """Return a clone of opensim-core with its tags; skip the test without a clone."""
     if not CLONE.is_dir():
         pytest.skip(f"needs a clone of opensim-core with its tags at {CLONE}")
     return CLONE

@@ -1,4 +1,4 @@
-"""Where a property belongs is found without building the classes that have nothing to do with it."""
+"""Check that finding the class of a property does not build unrelated classes."""
 
 from __future__ import annotations
 
@@ -9,7 +9,11 @@ from osimlite.schema.specs import get_field_specs
 
 
 def find_homes(classes: list[type[Object]]) -> dict[tuple[str, str], list[str]]:
-    """Return the classes that declare a property, by its tag and their package, by looking into all classes."""
+    """Return the classes that declare each property, by searching all classes.
+
+    Returns:
+        Names of classes by the tag of the property and the package of the class.
+    """
     declaring = {
         (tag, spec.declared_in) for cls in classes for tag, spec in get_field_specs(cls).items()
     }

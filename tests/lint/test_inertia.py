@@ -1,4 +1,4 @@
-"""The possible inertia nearest to an impossible one."""
+"""Check the computation of the valid inertia that is nearest to an invalid one."""
 
 from __future__ import annotations
 
@@ -36,7 +36,8 @@ def test_no_possible_inertia_is_nearer(inertia, seed):
     distance = np.linalg.norm(nearest - matrix(inertia))
     draw = np.random.default_rng(seed)
     for scale in (1e-3, 0.1, 1.0):
-        # The inertia of three masses on three axes, near the one found: none comes closer.
+        # The inertia of point masses near the result is valid. None may be nearer to the invalid
+        # inertia.
         half = np.eye(3) * np.trace(nearest) / 2 - nearest
         root = np.linalg.cholesky(half + 1e-9 * np.eye(3)) + scale * draw.normal(size=(3, 3))
         other = np.eye(3) * np.trace(root @ root.T) - root @ root.T

@@ -1,4 +1,4 @@
-"""What the linter says of pipelines of labs: faults that OpenSim does not mention, and no false alarms."""
+"""Check findings in complete pipelines: faults that OpenSim does not mention, and no false alarms."""
 
 from __future__ import annotations
 
@@ -12,12 +12,16 @@ from tests.labs import change, copy_lab
 
 
 def codes(path: Path) -> dict[str, str]:
-    """Codes of all findings with the message of the last one."""
+    """Check a file or folder.
+
+    Returns:
+        The message of the last finding of each code, by code.
+    """
     return {finding.code: finding.message for finding in osimlite.validate(path).findings}
 
 
 def rewrite_table(path: Path, factor: float, columns: slice) -> None:
-    """Multiply some columns of a storage file or a marker file."""
+    """Multiply some columns of a storage file or a marker file by a factor."""
     lines = path.read_text().splitlines()
     storage = "endheader" in lines
     first = lines.index("endheader") + 2 if storage else 5
@@ -53,7 +57,7 @@ def test_ground_that_pushes_twice(tmp_path: Path) -> None:
     folder = copy_lab("ground", tmp_path)
     assert "count twice" in codes(folder / "id.xml")["OSIM859"]
     assert "OSIM859" not in codes(folder / "id_all.xml")
-    # The foot is part of the shank: its force is not far away from that body.
+    # The foot is part of the shank, so that the force acts near that body.
     assert "OSIM849" not in codes(folder / "loads.xml")
 
 
@@ -97,7 +101,7 @@ def test_loads_in_kilonewtons(tmp_path: Path, unit: float) -> None:
     ids=["mm", "cm", "m", "too large"],
 )
 def test_units_of_markers_beside_the_model(tmp_path: Path, factor: float, said: str) -> None:
-    """Numbers that are of centimetres or metres in a file that says mm; other sizes have no unit that would explain."""
+    """Numbers in cm or m in a file that says mm are reported; no unit explains other factors."""
     folder = copy_lab("sides", tmp_path)
     assert "\tmm\t" in (folder / "walk.trc").read_text()
     rewrite_table(folder / "walk.trc", factor, slice(2, None))
@@ -108,7 +112,7 @@ def test_units_of_markers_beside_the_model(tmp_path: Path, factor: float, said: 
 
 
 def test_sides_that_are_not_swapped(tmp_path: Path) -> None:
-    """Rows outside of the times of the tool, and markers at 0 0 0, do not count."""
+    """Rows outside of the time range of the tool, and markers at 0 0 0, are ignored."""
     folder = copy_lab("sides", tmp_path)
     assert "OSIM856" not in codes(folder / "ik.xml")
     assert "OSIM856" not in codes(folder)

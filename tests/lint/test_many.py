@@ -1,4 +1,4 @@
-"""Many files: what is kept of a check, when it is believed again, and sharing the work."""
+"""Check many files at once: the cache of findings, when it is used, and parallel work."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def project(tmp_path):
 
 @pytest.fixture
 def checked(monkeypatch):
-    """The files that were really checked."""
+    """Return a list that grows by the name of each file that is checked instead of taken from the cache."""
     files: list[str] = []
     real = module.check_job
 
@@ -86,7 +86,7 @@ def test_another_text_or_configuration_is_checked(project, checked):
 
 @pytest.fixture
 def later(monkeypatch):
-    """Checks begin some seconds after files were written."""
+    """Let checks begin some seconds after files were written, so that their time stamps are trusted."""
     moment = time.time_ns() + 10**10
     monkeypatch.setattr(module, "time_ns", lambda: moment)
 
@@ -158,7 +158,7 @@ def test_a_broken_entry_is_no_entry(project, checked, content, findings_cache):
 
 
 def _places(value, *way):
-    """The way to every value in JSON data, and to all that is within it."""
+    """Yield the path of every value in JSON data, as keys and indices."""
     yield way
     parts = (
         value.items()
@@ -186,12 +186,12 @@ def test_an_entry_with_anything_of_another_type_is_no_entry(project, checked, fi
             inside = damaged
             for key in outer:
                 inside = inside[key]
-            # These may be missing.
+            # These fields may be None.
             fits = wrong is None and last in (line, column, suggestion, fix, consequence)
             others = {line: 7, column: 7, suggestion: "x"}
             fits = fits or (inside[last] is None and others.get(last) == wrong)
-            # The stamp of the file stands for its text, if the file was old enough to have one; with
-            # another stamp the text is compared.
+            # If the file was old enough to have a reliable time stamp, the stamp is compared
+            # instead of the text. With another stamp the text is compared.
             unread = ("file",) if whole["file"] is None else ("file", "text")
             if fits or (way[:1] and way[0] in unread) or type(inside[last]) is type(wrong):
                 continue

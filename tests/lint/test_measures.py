@@ -1,4 +1,4 @@
-"""What is measured of paths and muscles: when, how it is told that it could not be, and who does without."""
+"""Check measurements of paths and muscles: when they are made, and what is reported when they are not."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ WHY = (
     "rules OSIM42x, OSIM53x and OSIM63x did not run: they need osimlite[sim] (numpy is not installed); "
     "run: pip install 'osimlite[sim]'"
 )
-"""What is reported in an environment without numpy."""
+"""Report in an environment without numpy."""
 
 
 def test_a_model_without_muscles_is_checked_without_a_numeric_library(fixtures):
@@ -51,7 +51,7 @@ def test_missing_packages_are_reported_in_every_format_and_are_no_finding(bare, 
         assert done.stdout.endswith(f"{jumping}: {WHY}.\n")
     texts = {}
     for name in ("json", "sarif", "github"):
-        # A note is no finding, so that --fail-on info does not count it.
+        # A note is not a finding: --fail-on info does not count it.
         done = bare.call(
             "validate",
             "--no-cache",
@@ -133,7 +133,7 @@ def test_numbers_beyond_what_is_computed_with_are_no_traceback(fixtures):
 def test_a_path_is_reported_once_with_its_greatest_jump(fixtures):
     text = (fixtures / "lint" / "OSIM632" / JUMPING).read_text()
     (one, two) = validate(Source(text.encode())).findings
-    # It comes in at 0.2 and goes at 1.
+    # The point is active between 0.2 and 1.
     assert (
         "jumps by 18 mm at 'hip_flexion' = 11.46 deg, where the path starts or stops using 'b'"
         in one.message
@@ -160,7 +160,10 @@ def test_a_value_is_told_in_the_unit_of_what_the_coordinate_moves(motion, said):
 
 
 def test_without_machine_code_many_surfaces_are_not_measured(jumping, monkeypatch):
-    """The report says so, and is not kept: the next check may have some."""
+    """The report says that surfaces were not measured.
+
+    It is not cached, because the next check may have machine code.
+    """
     from osimlite.lint.measuring import model
 
     monkeypatch.setattr(measures, "MAX_WRAPS_UNCOMPILED", -1)

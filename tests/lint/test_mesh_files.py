@@ -1,4 +1,4 @@
-"""OSIM701 and OSIM703 where something is there, and is no file."""
+"""Check OSIM701 and OSIM703 where the path of a mesh exists but is not a file."""
 
 from __future__ import annotations
 

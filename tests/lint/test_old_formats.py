@@ -1,4 +1,4 @@
-"""An old document has an error where OpenSim's own upgrade fails; what OpenSim takes is not said to be refused."""
+"""Check that an old document has an error exactly where OpenSim's own upgrade fails."""
 
 from __future__ import annotations
 

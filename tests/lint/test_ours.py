@@ -1,4 +1,4 @@
-"""Which XML is OpenSim's, although its root is misspelt; what is passed over, and folders that are not there."""
+"""Check which XML files count as OpenSim's despite a misspelt root, skipped files, and missing folders."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def test_a_document_with_another_root_is_told_with_the_right_one(tmp_path, root,
     assert report.passed == [str(tmp_path / "pom.xml")]
     first = report.findings[0]
     assert (first.code, first.line, first.column, first.suggestion) == ("OSIM003", 2, 1, right)
-    # What is inside is checked all the same.
+    # The content is checked all the same.
     assert "OSIM821" in report.codes
     assert main_code("validate", str(tmp_path), "--unsafe-fixes") == 1
     assert re.sub(" xmlns.*?>", ">", file.read_text()) == SETUP

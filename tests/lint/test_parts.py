@@ -1,4 +1,4 @@
-"""What was measured is measured again where what it depends on has changed, and nowhere else."""
+"""Check that a measurement is repeated only where something that it depends on has changed."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ OWNER = re.compile(
 
 @pytest.fixture
 def asked(monkeypatch):
-    """The paths that are measured, each time that something is."""
+    """Return a list that grows by the measured paths at each measurement."""
     results: list[list[str]] = []
     own = osimlite.lint.measuring.measure_model
 

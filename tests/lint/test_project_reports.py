@@ -1,4 +1,4 @@
-"""A project with faults in a setup and in tables, in every way that a run can be asked for."""
+"""Check the reports on a project with faults in a setup and in tables, for all ways to call the linter."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tests.cli.command import run as command
 
 @pytest.fixture
 def project(fixtures, tmp_path, monkeypatch):
-    """A folder: a setup with two faults, a motion with two and marker data with one."""
+    """Return a folder with two faults in a setup, two in a motion, and one in marker data."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     folder = tmp_path / "project"
     (folder / "data").mkdir(parents=True)
@@ -22,7 +22,7 @@ def project(fixtures, tmp_path, monkeypatch):
     copy(fixtures / "lint" / "leg.trc", folder / "data")
     setup = (fixtures / "lint" / "OSIM821" / "pass-ik.xml").read_text()
     setup = setup.replace("../leg.osim", "leg.osim").replace("../leg.trc", "data/leg.trc")
-    # Coordinates that are given make up for the marker that is lost.
+    # Coordinate tasks replace the information of the marker that the setup misspells.
     tasks = "".join(
         f'<IKCoordinateTask name="{name}"> <value_type>manual_value</value_type> <weight>1</weight></IKCoordinateTask>'
         for name in ("pelvis_rz", "pelvis_tx", "pelvis_ty")
@@ -60,7 +60,7 @@ def test_rules_are_selected_ignored_and_counted(project):
         {("data/leg.trc", "OSIM802"), ("leg.mot", "OSIM802")},
         1,
     )
-    # What remains are warnings.
+    # Only warnings remain.
     assert found("--ignore", "table-count,OSIM803")[1] == 0
     assert found("--ignore", "table-count,OSIM803", "--fail-on", "warning")[1] == 1
     assert found("--select", "OSIM5")[0] == set()

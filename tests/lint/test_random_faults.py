@@ -1,7 +1,7 @@
-"""Whole projects with one fault at random: it is found on its line, in the right file.
+"""Check that a random fault in a complete project is found on its line in the right file.
 
-Three hundred by default; ``OSIMLITE_FAULTS=2000 OSIMLITE_SEED=7`` asks for others. What OpenSim
-says of them is asked in ``tests/oracle/test_random_faults.py``.
+The default are three hundred faults; ``OSIMLITE_FAULTS=2000 OSIMLITE_SEED=7`` sets their number and
+the seed. ``tests/oracle/test_random_faults.py`` compares such faults with OpenSim.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ NODES = (
     .partition("<x_nodes>")[2]
     .partition("</x_nodes>")[0]
 )
-"""The control curve of a setup."""
+"""Nodes of the control curve in a setup."""
 
 
 PROCESSOR = """
 				<ModelProcessor name="model">
 					<filepath>model.osim</filepath>
 				</ModelProcessor>"""
-"""The model of a study."""
+"""Model processor of a study."""
 
 
 @pytest.fixture(scope="module", params=[walking, pendulum], ids=["walking", "pendulum"])
@@ -64,7 +64,7 @@ def test_a_fault_is_found_where_it_is(folder):
 @pytest.mark.parametrize(
     ("folder", "file", "old", "new"),
     [
-        # Computed muscle control takes 0.03 s and a window of time before it controls anything.
+        # CMC needs 0.03 s and one time window before it controls anything.
         (walking, "cmc.xml", "<final_time>0.65", "<final_time>0.634"),
         (walking, "cmc.xml", "<cmc_time_window>0.005", "<cmc_time_window>0.021"),
         (walking, "rra.xml", "<final_time>0.51", "<final_time>0.5"),

@@ -1,4 +1,4 @@
-"""The formats of a report."""
+"""Check the formats of a report."""
 
 from __future__ import annotations
 
@@ -205,7 +205,7 @@ def test_a_model_made_in_python_shows_its_components():
 
 
 def test_bounds_of_a_domain_have_few_digits():
-    """The largest pennation angle is half pi, which a message need not print with 17 digits."""
+    """Half pi, the largest pennation angle, is printed with few digits."""
     from osimlite import Model, Thelen2003Muscle
 
     model = Model(name="m")
@@ -284,7 +284,7 @@ def test_what_many_files_say_is_folded_too():
         full.count("the time") == 1
         and "= 5 more in other files: m1.sto, m2.sto, m3.sto and 2 more\n" in full
     )
-    # Of other names each file says something of its own.
+    # Messages with different names are not folded.
     assert full.count("no body") == 6
     assert "; 5 more in other files\n" in render(Report(late), "concise")
     assert render(Report(late[:3])).count("the time") == 3

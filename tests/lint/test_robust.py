@@ -1,4 +1,4 @@
-"""Whatever stands in a file, the validator answers with findings."""
+"""Check that the linter answers any content of a file with findings."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ def test_odd_bytes_raise_nothing(data):
 
 
 def renamed(source: Source, number: int, tag: str) -> str:
-    """The text with an element called otherwise."""
+    """Return the text with one element renamed."""
     span, text = source.spans[number], source.text
     if span.inner_end < span.end:
         text = text[: span.inner_end + 2] + tag + text[span.inner_end + 2 + len(span.tag) :]
@@ -123,7 +123,7 @@ def renamed(source: Source, number: int, tag: str) -> str:
 )
 @pytest.mark.parametrize("tag", ["Plugin", "Marker"])
 def test_an_object_of_another_class_anywhere_has_a_finding(path, tag):
-    """A class of a plug-in, and one that belongs elsewhere, in the place of each element that a rule looks at."""
+    """Replace each element that a rule reads by a class of a plug-in, and by a misplaced class."""
     source = Source.from_file(path)
     known = {span.tag for span in Source(TEXTS[0].encode()).spans}
     for number, span in enumerate(source.spans):
@@ -138,7 +138,7 @@ def test_an_object_of_another_class_anywhere_has_a_finding(path, tag):
 @pytest.mark.parametrize(
     "scrap",
     [
-        # Values with faults in objects that stand nowhere in the model that OpenSim makes of the
+        # Invalid values in objects that are not part of the model that OpenSim builds from the
         # text.
         "<prescribed_function><Constant/><Constant><value>1,5</value></Constant></prescribed_function>",
         "<prescribed_function><Constant/><SimmSpline><x>0 a</x></SimmSpline></prescribed_function>",

@@ -1,4 +1,4 @@
-"""Every rule: its page, its examples, and its fixtures."""
+"""Check every rule: its page, its examples, and its fixtures."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ HEADINGS = ["What it does", "Why is this bad", "Example", "Use instead"]
 
 
 def beside(name: str) -> Any:
-    """A module of this folder."""
+    """Return a module of this folder, loaded from its file."""
     spec = importlib.util.spec_from_file_location(name, HERE / f"{name}.py")
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
@@ -44,14 +44,14 @@ def beside(name: str) -> Any:
 skeleton, trials = beside("skeleton"), beside("trials")
 
 MEASURED = ("OSIM63",)
-"""Rules that speak of every muscle and path there is, wherever another rule has an example."""
+"""Rules that measure all muscles and paths, and would therefore report in examples of other rules."""
 
 RULES = [pytest.param(rule, id=rule.code) for rule in all_rules()]
 
 
 @cache
 def checked(path: Path, rule: Rule):
-    """What is found in an example or fixture of a rule."""
+    """Return the findings in an example or fixture of a rule."""
     if path.suffix == ".trial":
         return trials.checked_trial(path.read_text(), rule)
     ignored = () if rule.code.startswith(MEASURED) else MEASURED
@@ -59,7 +59,7 @@ def checked(path: Path, rule: Rule):
 
 
 def example(rule: Rule, heading: str) -> bytes:
-    """The document under a heading of a rule's page."""
+    """Return the document under a heading of a rule's page."""
     section = rule.page.split(f"## {heading}\n", 1)[1].split("\n## ", 1)[0]
     block = re.search(r"```(\S+)\n(.*?)```", section, re.DOTALL)
     assert block is not None, f"{rule.code} shows nothing under '{heading}'"
@@ -104,11 +104,11 @@ def test_a_page_has_its_headings_and_prose(rule):
 
 
 def example_file(rule: Rule, heading: str, folder: Path) -> Path:
-    """The same as a file."""
+    """Write the document under a heading of a rule's page as a file, and return its path."""
     block = re.search(r"```(sto|trc|setup|trial)\n", rule.page)
     path = folder / f"example.{'osim' if block is None else block[1].replace('setup', 'xml')}"
     if path.suffix == ".xml":
-        # What setups name, and the tool that names a setup.
+        # Copy the files that setups name, and the tool that names the setup.
         for file in filter(Path.is_file, FIXTURES.iterdir()):
             copy(file, folder)
         for file in (FIXTURES / rule.code).glob("tool.xml"):
@@ -177,7 +177,8 @@ def test_a_severity_in_the_settings_does_not_change_what_opensim_does():
 
 
 def test_the_index_of_rules_is_that_of_the_rules():
-    # python -c "from osimlite.lint.pages import format_index; print(format_index(), end='')" > docs/rules.md
+    # To update the index: python -c "from osimlite.lint.pages import format_index;
+    # print(format_index(), end='')" > docs/rules.md
     assert (HERE.parents[1] / "docs" / "rules.md").read_text(encoding="utf-8") == format_index()
 
 
@@ -211,7 +212,7 @@ def test_a_body_with_a_blank_in_its_name_is_refused_in_old_files_too():
     [
         (40600, "my hip", Severity.ERROR),
         (30500, "my hip", Severity.ERROR),
-        # OpenSim takes the blank out by itself, and not out of the group.
+        # OpenSim removes the blank from the name of the object, but not from the group.
         (30000, "my hip", Severity.WARNING),
         (30000, "my/hip", Severity.ERROR),
     ],

@@ -1,4 +1,4 @@
-"""Settings of a project, comments that ignore, and baselines."""
+"""Check settings of a project, suppressions in comments, and baselines."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def test_thresholds_of_a_project_move_what_is_found(tmp_path):
     "rule", [rule for rule in all_rules() if rule.thresholds], ids=lambda rule: rule.code
 )
 def test_each_threshold_moves_the_findings_of_its_rule(rule):
-    """With every threshold as wide as can be, or as narrow, the failing fixtures of a rule give other findings."""
+    """Extreme values of each threshold change the findings in the failing fixtures of a rule."""
     fixtures = [
         path
         for kind in ("osim", "trial")
@@ -167,7 +167,7 @@ def test_a_comment_that_ignores_nothing_is_found():
     text = TEXT.replace("<foo/>", "<foo/> <!-- osimlite: ignore OSIM101 OSIM203 -->")
     (finding,) = validate(Source(text.encode()), ignore="OSIM505").findings
     assert finding.code == "OSIM010" and "'OSIM203'" in finding.message and finding.line == 4
-    # Of a rule that did not run nobody knows.
+    # Whether a suppression is unused is unknown if its rule did not run.
     assert not validate(Source(text.encode()), ignore="OSIM505,OSIM203").findings
 
 
@@ -176,7 +176,7 @@ def test_a_baseline_hides_what_it_knows_and_no_more(tmp_path):
     old = validate(Source(TEXT.encode(), "m.osim"))
     assert write_baseline(path, old) == 2
     moved = Source(TEXT.replace("<foo/>", "\n\n<foo/><foo/>").encode(), "m.osim")
-    # One finding counts all elements of an unknown name: one more of them makes another message.
+    # One finding counts all elements with an unknown name, so that one more changes its message.
     assert validate(moved).codes == {"OSIM505": 1, "OSIM101": 1}
     assert subtract_baseline(path, validate(moved)).codes == {"OSIM101": 1}
     assert json.loads(path.read_text())["format"] == 1

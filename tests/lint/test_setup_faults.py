@@ -1,4 +1,4 @@
-"""Each fault of the table of faults is found on its line, and what is harmless is not found."""
+"""Check that each fault of the table of faults is found on its line, and that harmless changes are not."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tests.lint.setup_faults import FAULTS, HARMLESS, STUDIES, TEXTS, UNTOLD, Fa
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A folder for all tests: the model in it is read once."""
+    """Return a folder for all tests, so that the model in it is read only once."""
     folder = tmp_path_factory.mktemp("pipeline")
     for name, text in TEXTS.items():
         (folder / name).write_text(text)
@@ -22,7 +22,7 @@ def folder(tmp_path_factory):
 
 @pytest.fixture
 def pipeline(folder):
-    """The folder of the pipeline, in which a test may change a file."""
+    """Return the folder of the pipeline; files that the test changes are restored afterwards."""
     yield folder
     for name, text in TEXTS.items():
         if (folder / name).read_bytes().decode() != text:
@@ -30,7 +30,7 @@ def pipeline(folder):
 
 
 def checked(*files: Path) -> list[tuple[str, int | None, str, str]]:
-    """What is found in setups and tables."""
+    """Return file, line, code and text of all findings in setups and tables."""
     return [
         (file.name, one.line, one.code, str(one))
         for file in files
@@ -84,7 +84,7 @@ def test_a_model_may_be_named_by_its_absolute_path(pipeline):
 def test_a_controller_names_actuators_by_their_paths_and_names_of_older_documents_are_left_out(
     pipeline, version, given, severities
 ):
-    """As OpenSim 4.6 takes them."""
+    """OpenSim 4.6 does the same."""
     text = TEXTS["forward.xml"].replace('"40600"', f'"{version}"')
     text = text.replace(
         "<results_directory>", "<force_set_files>reserves.xml</force_set_files><results_directory>"

@@ -1,4 +1,4 @@
-"""Setups: what they name in the model, in the data and among each other."""
+"""Check the references of setups to the model, to data, and to each other."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from osimlite.schema.registry import MODULES
 
 @pytest.fixture
 def project(fixtures, tmp_path, monkeypatch):
-    """A folder with a model, data and two setups, in which the program runs."""
+    """Return a folder with a model, data and setups, which becomes the current folder."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     folder = tmp_path / "project"
     folder.mkdir()
@@ -44,7 +44,7 @@ def test_a_folder_is_checked_as_a_whole(project, capsys):
     assert capsys.readouterr().out.startswith("No findings in 12")
     assert validate(".").checked == 12
     assert len(find_project_files([".", project / "ik.xml", "./../project"])) == 12
-    # The name of a marker is changed in the model alone.
+    # The marker is renamed in the model only.
     model = project / "leg.osim"
     model.write_text(model.read_text().replace('"knee_marker"', '"knee"'))
     report = check_files(
@@ -83,7 +83,7 @@ def test_the_input_directory_of_old_setups_is_no_misspelling(project, folder, se
     [("leg_walk.trc", False), ("leg_loads.mot", True), ("leg_states.sto", True)],
 )
 def test_only_files_that_a_tool_can_write_may_be_missing(project, missing, writable):
-    """A tool writes tables under its own name, but no measured markers; a ScaleTool writes none."""
+    """A tool writes tables under its own name, but no marker files; a ScaleTool writes no tables."""
     for writer in ("ScaleTool", "AnalyzeTool"):
         (project / "scale.xml").write_text(
             f'<OpenSimDocument Version="40600"><{writer} name="leg"/></OpenSimDocument>'
@@ -187,7 +187,7 @@ def test_loads_that_no_subject_bears_are_told(project, fixtures, sizes, line):
 @pytest.mark.parametrize(
     ("file", "old", "new", "codes"),
     [
-        # Two markers of the model in one place are no distance that could be scaled.
+        # Two markers at one position have no distance by which a body could be scaled.
         (
             "leg.osim",
             r"/bodyset/shank</socket_parent_frame>\s*<location>0 0.2 0.05",
@@ -195,8 +195,7 @@ def test_loads_that_no_subject_bears_are_told(project, fixtures, sizes, line):
             {"OSIM855"},
         ),
         ("leg.trc", "Units", "units", {"OSIM801"}),
-        # A way through a folder that is not there leads nowhere, though the text of the path could
-        # be made shorter.
+        # A path through a missing folder is invalid, although its text could be simplified.
         ("ik.xml", ">leg.osim<", ">data/../leg.osim<", {"OSIM821"}),
         ("markers.omoco", "<goals>", "<state_infos><Foo/></state_infos><goals>", {"OSIM102"}),
         (
@@ -236,7 +235,7 @@ def test_a_file_of_coordinates_in_radians_is_told_to_inverse_kinematics(project)
 
 @pytest.mark.parametrize("name", ["leg.osim", "ik.xml", "leg_grf.xml"])
 def test_what_is_at_the_top_is_read_from_where_it_stands(project, name):
-    """OpenSim 4.6 looks for the file of none at the top: tools end as without it."""
+    """OpenSim 4.6 does not read the `file` attribute of a root object."""
     text = (project / name).read_text()
     (project / name).write_text(
         re.sub(r"(Document Version=.*?<\w+)", r'\1 file="nowhere.xml"', text, flags=re.DOTALL)
@@ -435,7 +434,7 @@ def test_a_weight_of_zero_is_a_warning_where_nobody_gave_it(project):
 @pytest.mark.parametrize("body", ["", "<body><a/></body>", "<body>ground<!-- --></body>"])
 @pytest.mark.parametrize("version", [20302, 30000, 30500, 30501])
 def test_a_marker_of_an_old_file_needs_a_body(tmp_path, body, version):
-    """OpenSim 4.6 reads the body of such a marker without asking whether it is there."""
+    """OpenSim 4.6 reads the body of such a marker without checking that it exists."""
     path = tmp_path / "markers.xml"
     path.write_text(
         f'<OpenSimDocument Version="{version}"><MarkerSet name="s"><objects><Marker name="a">{body}'
@@ -448,7 +447,7 @@ def test_a_marker_of_an_old_file_needs_a_body(tmp_path, body, version):
 
 @pytest.mark.parametrize("start", ["trolSet name='c'>", "ls>"])
 def test_a_text_whose_root_tag_is_damaged_gets_a_syntax_error(tmp_path, start):
-    """The reader sees that the root is another one before it sees that the text is damaged."""
+    """The reader notices the wrong root before it notices the damage."""
     path = tmp_path / "controls.xml"
     path.write_text(
         f"<?xml version='1.0'?>{start}<objects><ControlLinear name='a'/></objects></ControlSet>"

@@ -1,4 +1,4 @@
-"""What lines look like: every short text is told as a regular expression tells it."""
+"""Compare the fast classification of table rows with regular expressions, for every short text."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def expected(line: bytes, layout: RowLayout) -> bytes:
 
 
 LONGER = {ROWS: r"^\.", VECTORS: r"^\.", MARKERS: r"^[. ]| \.|\d[eE]"}
-"""Good lines that are looked at longer."""
+"""Pattern of valid lines, by layout, that the fast classification passes on to the slow check."""
 
 
 def check(line: bytes, look: bytes, layout: RowLayout) -> None:

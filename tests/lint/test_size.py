@@ -1,4 +1,4 @@
-"""What is found in large bad models: the work grows with their size, and messages do not."""
+"""Check large models with many faults: the work grows linearly, and the number of messages is limited."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ KINDS = {
 
 
 def calls(text: str) -> int:
-    """How many functions are called, and steps of generators taken, to check a text."""
+    """Return the number of function calls and generator steps that checking a text takes."""
     count = 0
 
     def note(*_: object) -> None:
@@ -82,7 +82,7 @@ def calls(text: str) -> int:
 @pytest.mark.parametrize("kind", KINDS)
 def test_four_times_as_much_is_four_times_the_work(kind):
     calls(KINDS[kind](10))
-    # A body costs ten times as much as the others.
+    # A body costs ten times as much as the other elements.
     count = choose(15 if kind == "bodies of one name" else 50, 100)
     small, large = calls(KINDS[kind](count)), calls(KINDS[kind](4 * count))
     assert large < 5.5 * small

@@ -1,4 +1,4 @@
-"""Mends of tables and setups: what was broken is as it was, and nothing else is touched."""
+"""Check fixes of tables and setups: they restore the original text, and change nothing else."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def test_what_nobody_knows_is_left_alone():
 @pytest.mark.parametrize(
     ("data", "old", "new"),
     [
-        # A label is lost, a line is broken, a line is not what it should be.
+        # A label is missing, a line is broken in two, or a header line is invalid.
         (MOTION, b"\thip", b""),
         (MARKERS, b"knee_marker", b"knee\nmarker"),
         (MARKERS, b"Frame#\tTime\t", b"asis\t\t\t"),
@@ -81,7 +81,7 @@ RIGHT = {"version": "40600", "markers": "leg.trc", "task": "asis", "coordinate":
 
 @pytest.fixture
 def setup_file(tmp_path):
-    """The path of a setup beside what it names."""
+    """Return the path of a setup in a folder with the files that it names."""
     for file in LINT.glob("leg*"):
         copy(file, tmp_path)
     (tmp_path / "ik.xml").touch()
@@ -107,7 +107,7 @@ def test_a_name_in_a_setup_is_mended_as_surely_as_it_is_known(setup_file, change
 
 
 def test_only_the_words_of_the_finding_are_replaced(setup_file):
-    # Whoever wrote a letter as its number had a reason.
+    # A character reference was written on purpose, therefore it is not fixed.
     broken = SETUP.format(**{**RIGHT, "coordinate": "knee_anlge"}).replace(
         '"knee_anlge"', '"&#107;nee_anlge"'
     )

@@ -1,4 +1,4 @@
-"""Every fault of tables that the list of faults knows is found in its line and column, and what is harmless is not."""
+"""Check that faults of tables are reported at their line and column, and harmless changes are not."""
 
 from __future__ import annotations
 

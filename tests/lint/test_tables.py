@@ -1,4 +1,4 @@
-"""Tables: what is found in files that differ from a good one in one thing, and what is not."""
+"""Check findings in tables that differ from a valid one in one respect."""
 
 from __future__ import annotations
 
@@ -170,7 +170,7 @@ def test_the_last_row_twice_is_how_opensim_ends_some_results(tmp_path, times, se
 
 
 def test_rows_of_vectors_are_taken_many_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Only rows that are not good are looked at one by one: quaternions and Vec3 are no such."""
+    """Rows of vectors and quaternions are examined in blocks; only invalid rows are examined one by one."""
     lines = [f"{0.1 * k:.1f}\t1,-2e-3,{k}\t0.5,0.25,-1\n" for k in range(50)]
     lines[20] = "2.0\t1,2\t0.5,0.25,-1\n"
     odd: list[int] = []

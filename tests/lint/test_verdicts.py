@@ -1,4 +1,4 @@
-"""Models of which a finding was missed, or said wrongly: one of each class that a review found, and others like it."""
+"""Check models for which an earlier version missed a finding or reported a wrong one."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SPRING = "<resting_length>1</resting_length><stiffness>1</stiffness><dissipation
 
 
 def check(text: str) -> Report:
-    """Return the findings of a text, but for those that are measured over ranges."""
+    """Return the findings in a text, except for those that need measurements over ranges."""
     return validate(Source(text.encode(), "m.osim"), ignore="OSIM63")
 
 
@@ -52,13 +52,16 @@ def test_what_opensim_leaves_out_refers_to_no_old_name(unknown: str):
 
 
 def test_a_rule_that_reads_the_model_needs_no_numeric_library(tmp_path: Path):
-    """Without numpy the other rules report as before, and the report says which rules were not measured."""
+    """Without numpy the other rules report as before.
+
+    The report says which rules were not measured.
+    """
     environment = BareEnvironment(tmp_path / "environment")
     files = [f"{number}.osim" for number in range(len(CASES))]
     for name, case in zip(files, CASES, strict=True):
         (tmp_path / name).write_text(case.text)
     done = environment.call("validate", "--no-cache", "--format", "json", *files, folder=tmp_path)
-    # A busy machine takes so long that the command says how far it is.
+    # On a busy machine the command takes long enough to print its progress.
     lines = done.stderr.splitlines()
     assert [line for line in lines if not line.startswith("osimlite: checking: ")] == []
     codes: dict[str, set[str]] = {name: set() for name in files}
@@ -78,7 +81,7 @@ def test_a_rule_that_reads_the_model_needs_no_numeric_library(tmp_path: Path):
 
 
 def test_a_force_that_is_not_finite_is_reported_beside_ignored_elements():
-    """An element that OpenSim ignores, in the same force, does not explain NaN."""
+    """An element that OpenSim ignores, in the same force, does not explain a result of NaN."""
     force = (
         '<ExpressionBasedCoordinateForce name="f"><coordinate>q</coordinate>'
         "<expression>log(q-0.3)</expression><Colour>red</Colour></ExpressionBasedCoordinateForce>"
@@ -87,7 +90,7 @@ def test_a_force_that_is_not_finite_is_reported_beside_ignored_elements():
 
 
 def test_an_actuator_in_a_list_that_no_set_holds():
-    """OpenSim does not read it, so that the controller drives the one in the ForceSet."""
+    """OpenSim does not read such an actuator, so that the controller drives the one in the ForceSet."""
     actuator = '<CoordinateActuator name="act"><coordinate>q</coordinate></CoordinateActuator>'
     controller = (
         '<PrescribedController name="c"><actuator_list>act</actuator_list>'
@@ -101,7 +104,7 @@ def test_an_actuator_in_a_list_that_no_set_holds():
 
 
 def test_a_coupler_without_coordinates():
-    """OpenSim reads memory that it has not set: it runs, or computes NaN."""
+    """OpenSim reads uninitialised memory: it runs, or computes NaN."""
     constraint = (
         '<CoordinateCouplerConstraint name="f"><coupled_coordinates_function><LinearFunction>'
         "<coefficients>1 0</coefficients></LinearFunction></coupled_coordinates_function>"

@@ -1,4 +1,4 @@
-"""Inputs, axes of custom joints, and names in constraints and probes."""
+"""Check inputs, axes of custom joints, and names in constraints and probes."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ KNEE = "/jointset/knee/knee_angle"
 @pytest.mark.parametrize(
     ("words", "right"),
     [
-        # As OpenSim 4.6 was seen to take or refuse each.
+        # The verdicts were measured with OpenSim 4.6.
         (f"{KNEE}|value", True),
         (f"{KNEE}|value(knee)", True),
         (f"{KNEE}|value:", True),

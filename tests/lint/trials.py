@@ -1,4 +1,4 @@
-"""What was measured of a trial, as the examples and fixtures of rules about trials say it.
+"""Read measurements of a trial from the examples and fixtures of rules about trials.
 
 A line for each number: ``peak of FY: 61 N, with loads of 850 N``.
 """
@@ -20,7 +20,7 @@ LINE = re.compile(
 
 
 def trial_in(text: str, rule: Rule, config: Config | None = None) -> Trial:
-    """A file of a trial of which these numbers are, all of one rule."""
+    """Return a trial with the measurements in a text, all for one rule."""
     numbers = []
     for number, line in enumerate(text.splitlines(), start=1):
         said = LINE.fullmatch(line)
@@ -40,5 +40,5 @@ def trial_in(text: str, rule: Rule, config: Config | None = None) -> Trial:
 
 
 def checked_trial(text: str, rule: Rule, config: Config | None = None) -> Report:
-    """What rules find in these numbers."""
+    """Return the findings of the rules in these measurements."""
     return run_rules(trial_in(text, rule, config))

@@ -1,7 +1,7 @@
-"""Small models with one fault each, what the linter must say, and what OpenSim 4.6 does (measured).
+"""Small models with one fault each, the expected error, and what OpenSim 4.6 does (measured).
 
-A model is a pendulum `a` on the pin `q` and a slider `s` that carries `b`; a case adds elements to
-it. `tests/oracle/test_lint_verdicts.py` asks OpenSim for the same.
+Each model is a pendulum `a` on the pin `q` and a slider `s` that carries `b`; a case adds elements
+to it. `tests/oracle/test_lint_verdicts.py` compares the verdicts with OpenSim.
 """
 
 from __future__ import annotations
@@ -10,16 +10,16 @@ from html import escape
 from typing import NamedTuple
 
 RUNS, FAILS = "runs", "fails"
-"""What OpenSim does: it computes finite accelerations, or refuses the model, or computes NaN."""
+"""Verdicts of OpenSim: RUNS if all accelerations are finite, FAILS if it rejects the model or computes NaN."""
 
 
 class Case(NamedTuple):
-    """A model and the verdict on it."""
+    """Model with its expected error and OpenSim's verdict."""
 
     name: str
     text: str
-    code: str  # of the finding that must be there; empty if no error may be
-    verdict: str  # of OpenSim
+    code: str  # of the expected error, empty for none
+    verdict: str  # of OpenSim, RUNS or FAILS
 
 
 def small_model(
@@ -34,7 +34,7 @@ def small_model(
     children: str = "",
     extra: str = "",
 ) -> str:
-    """Return the text of the pendulum with more elements in its sets."""
+    """Return the text of the pendulum with additional elements in its sets."""
     return f"""<?xml version="1.0"?><OpenSimDocument Version="40600"><Model name="m">
 <BodySet name="bodyset"><objects>
 <Body name="a"><mass>1</mass><inertia>0.1 0.1 0.1 0 0 0</inertia>{children}</Body>
@@ -58,7 +58,7 @@ def small_model(
 
 
 def path_of(*points: tuple[str, str]) -> str:
-    """Return the GeometryPath through points, each a frame and a location."""
+    """Return the GeometryPath through points, each given by a frame and a location."""
     inside = "".join(
         f'<PathPoint name="p{number}"><socket_parent_frame>{frame}</socket_parent_frame>'
         f"<location>{place}</location></PathPoint>"
@@ -83,7 +83,7 @@ LOCKED = "<locked>true</locked>"
 
 
 def expressions() -> list[Case]:
-    """Return formulas that OpenSim reads and others that it does not."""
+    """Return formulas that OpenSim accepts, and others that it rejects."""
     cases = []
     for formula, code in (
         ("-2*q-0.1*qdot", ""),
@@ -176,7 +176,7 @@ def expressions() -> list[Case]:
 
 
 def constraints() -> list[Case]:
-    """Return constraints that a pose meets, and others that none does."""
+    """Return constraints that some pose fulfils, and others that no pose fulfils."""
 
     def distance(first: str, second: str, place: str, size: float) -> str:
         return _tag(
@@ -243,7 +243,7 @@ def constraints() -> list[Case]:
 
 
 def find_contradictions() -> list[Case]:
-    """Return properties that contradict each other, or their frames, each fine alone."""
+    """Return models whose properties or frames contradict each other, although each is valid alone."""
     cases = []
     for name, function, code in (
         ("equal constant", "<Constant><value>0.3</value></Constant>", ""),
@@ -366,7 +366,7 @@ def find_contradictions() -> list[Case]:
 
 
 def cables() -> list[Case]:
-    """Return paths over obstacles that OpenSim can lay, and others that it cannot."""
+    """Return paths over obstacles that OpenSim can compute, and others that it cannot."""
     sizes = {
         "ContactSphere": "<radius>0.1</radius>",
         "ContactCylinder": "<radius>0.1</radius>",
@@ -439,7 +439,7 @@ def cables() -> list[Case]:
                 )
             )
     sphere = "ContactSphere"
-    # OpenSim takes the place in an offset frame for one in its body.
+    # OpenSim interprets the location on an offset frame as a location on its body.
     by_offset = cable(sphere, "0.02 0.32 0", frame="/jointset/j/c")
     cases += [
         Case(
@@ -463,7 +463,7 @@ def cables() -> list[Case]:
 
 
 def functions() -> list[Case]:
-    """Return functions that OpenSim computes otherwise than one may expect, and others that it refuses."""
+    """Return functions that OpenSim computes in an unexpected way, and others that it rejects."""
     table = (
         ("<SimmSpline><x>0 1 2</x><y>0 1 3 4</y></SimmSpline>", "OSIM602", RUNS),
         ("<PiecewiseLinearFunction><x>1</x><y>0.3</y></PiecewiseLinearFunction>", "", RUNS),
@@ -502,7 +502,7 @@ def functions() -> list[Case]:
 
 
 def unused() -> list[Case]:
-    """Return faults of functions and formulas in what is on, and in what is off."""
+    """Return faults of functions and formulas in enabled and in disabled components."""
     actuator = (
         '<CoordinateActuator name="act"><appliesForce>{}</appliesForce><coordinate>q</coordinate>'
         "<optimal_force>1</optimal_force></CoordinateActuator>"
@@ -552,7 +552,7 @@ def unused() -> list[Case]:
         "<coordinate_paths>/jointset/j/q</coordinate_paths><length_function>{}</length_function></FunctionBasedPath>"
         "<resting_length>1</resting_length><stiffness>1</stiffness><dissipation>0</dissipation></PathSpring>"
     )
-    # OpenSim makes the functions of such a path as it reads it.
+    # OpenSim creates the functions of such a path while it reads the file.
     for function, code in faults[:3]:
         text = small_model(forces=length.format(function))
         cases.append(Case(f"{code}: length of a path that is off", text, code, FAILS))
@@ -574,7 +574,7 @@ def unused() -> list[Case]:
 
 
 def texts() -> list[Case]:
-    """Return values in CDATA sections, and instructions and comments beside values."""
+    """Return values in CDATA sections, and processing instructions and comments next to values."""
 
     def section(text: str) -> str:
         return f"<![CDATA[{text}]]>"
@@ -636,7 +636,7 @@ def texts() -> list[Case]:
 
 
 def frames() -> list[Case]:
-    """Return frames in circles."""
+    """Return frames that depend on each other in cycles."""
 
     def frame(name: str, parent: str) -> str:
         return f'<PhysicalOffsetFrame name="{name}"><socket_parent>{parent}</socket_parent></PhysicalOffsetFrame>'
@@ -665,7 +665,7 @@ def frames() -> list[Case]:
 
 
 def poses() -> list[Case]:
-    """Return joints in poses where a direction is lost, and bodies without mass."""
+    """Return joints in singular poses, and bodies without mass."""
 
     def joint(kind: str, angle: str) -> str:
         return small_model(
@@ -700,7 +700,7 @@ def poses() -> list[Case]:
 
 
 def others() -> list[Case]:
-    """Return forces and controllers that stand in the wrong place."""
+    """Return forces and controllers in the wrong place."""
     motor = '<CoordinateActuator name="m"><coordinate>q</coordinate></CoordinateActuator>'
 
     def reflex(more: str = "") -> str:
@@ -755,7 +755,7 @@ def others() -> list[Case]:
 
 
 def magnitudes() -> list[Case]:
-    """Return numbers that are too large or too small for what OpenSim computes with them."""
+    """Return numbers that are too large or too small for OpenSim's computations."""
 
     def muscle(kind: str, **more: object) -> str:
         sizes = {"max_isometric_force": 100, "optimal_fiber_length": 0.1}
@@ -826,7 +826,7 @@ def magnitudes() -> list[Case]:
 
 
 def not_a_number_unused() -> list[Case]:
-    """Return NaN in what is on, and in what is off."""
+    """Return NaN in enabled and in disabled components."""
     forces: dict[str, dict[str, object]] = {
         "SpringGeneralizedForce": {"coordinate": "q", "stiffness": "NaN"},
         "PointToPointSpring": {
@@ -885,11 +885,11 @@ OLD_TEXT = """<?xml version="1.0"?><OpenSimDocument Version="30000"><Model name=
 <ContactGeometrySet><objects>GEOMETRY</objects></ContactGeometrySet>
 <ProbeSet><objects>PROBES</objects></ProbeSet></Model></OpenSimDocument>
 """
-"""A pendulum in the format of OpenSim 3, with places for more elements."""
+"""Pendulum in the format of OpenSim 3, with placeholders for more elements."""
 
 
 def old_names() -> list[Case]:
-    """Return old models with a blank in a name, which OpenSim takes out of the name and out of nothing else."""
+    """Return old models with a blank in a name; OpenSim removes it from the name but not from references."""
 
     def old(name: str, verdict: str, **places: str) -> Case:
         text = OLD_TEXT
@@ -957,4 +957,4 @@ CASES = [
     *not_a_number_unused(),
     *old_names(),
 ]
-"""All of them."""
+"""All cases."""
