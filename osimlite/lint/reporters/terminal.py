@@ -313,11 +313,11 @@ def _format_block(fold: Fold, lines: list[str] | None, colour: bool, width: int)
     ):
         # Break after the position, before the terminal breaks the line anywhere.
         rows = [f"{position}:", f"  {heading}"]
+    # A per cent sign stays in the line of its number.
+    message = escape_unprintable(finding.message).replace(" %", "\u00a0%")
     rows += [
-        f"  {row}"
-        for row in textwrap.wrap(
-            escape_unprintable(finding.message), width - 4, break_on_hyphens=False
-        )
+        f"  {row}".replace("\u00a0%", " %")
+        for row in textwrap.wrap(message, width - 4, break_on_hyphens=False)
     ]
     if finding.line is not None and lines is not None and finding.line <= len(lines):
         rows += _format_snippet(finding, lines[finding.line - 1], colour, width)

@@ -28,8 +28,8 @@ def report_sensor_without_frame(setup: Setup, report: FindingCollector) -> None:
 
     Compares the columns of measured orientations with the frames of the model: inverse kinematics
     uses columns with the name of a frame, the IMUPlacer those with the name of a frame and the
-    suffix `_imu`. Looks up the sensors that the tool names among the columns. The table must
-    contain quaternions.
+    suffix `_imu`. Also checks whether the table has a column for each sensor that the tool names.
+    The table must contain quaternions.
 
     OpenSim ignores sensors without a frame, and only logs the number of the others; if none is
     left, it rejects the table.

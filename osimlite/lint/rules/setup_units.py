@@ -171,8 +171,9 @@ def _find_largest_load(forces: Sequence[Any], table: Table) -> float:
 def report_ground_twice(setup: Setup, report: FindingCollector) -> None:
     """A contact force of the model and a measured load act on the same body.
 
-    Looks for measured forces on bodies that have contact surfaces, and for contact forces of the
-    model between such a surface and one that is fixed to ground, which the tool does not exclude.
+    Reports a body on which a measured force acts, and also a contact force of the model: one between
+    a surface of the body and a surface that is fixed to ground. Contact forces that the tool
+    excludes do not count.
 
     OpenSim applies both: the ground reaction counts twice, and the residual forces are as large as
     the weight. Exclude the contact forces with `forces_to_exclude`, or disable them in the model.
