@@ -16,6 +16,8 @@ MAX_NAMED_COORDINATES = 8
 """Number of undetermined coordinates that a message names."""
 RECOMMENDS = "OpenSim recommends"
 """Begins the note of a message about marker errors beyond the recommended limits."""
+UNDETERMINED = "no measurement determines"
+"""Begins the message about coordinates that no measurement determines."""
 NO_EFFECT = "Such parts have no effect on the fit"
 """Consequence for parts of unknown classes where a motion is fitted to markers."""
 MAX_NAMED_PARTS = 3
@@ -76,7 +78,7 @@ def describe_fit(
         yield f"{frames} without any measurement that has a weight: the pose of the frame before is kept"
     if motion.undetermined:
         yield (
-            "no measurement determines "
+            f"{UNDETERMINED} "
             f"{join_words(motion.undetermined, max_count=MAX_NAMED_COORDINATES)}, which stay near the "
             "default pose; OpenSim may find other values, such as the middle of their ranges. Lock "
             "them, or add tasks for them"

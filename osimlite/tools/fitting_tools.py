@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,7 +11,12 @@ import numpy as np
 
 from osimlite.base.records import replace
 from osimlite.base.text import join_words
-from osimlite.fitting.fit_messages import NO_EFFECT, describe_fit, describe_unknown
+from osimlite.fitting.fit_messages import (
+    NO_EFFECT,
+    UNDETERMINED,
+    describe_fit,
+    describe_unknown,
+)
 from osimlite.fitting.ik_tool import create_motion_table, run_inverse_kinematics
 from osimlite.fitting.inverse_kinematics import inverse_kinematics
 from osimlite.fitting.marker_data import MarkerData
@@ -82,8 +88,7 @@ def run_inverse_kinematics_tool(job: Job, outcome: Outcome) -> None:
     if message := describe_unknown(model, NO_EFFECT):
         outcome.add_warning("unknown classes", message)
     outcome.summary |= motion.summary
-    for message in describe_fit(motion):
-        outcome.add_message("markers", message)
+    _add_fit_messages(outcome, "markers", describe_fit(motion))
     requested = [
         task.name for task in setup.ik_task_set.objects if task.apply and is_a(task, "IKMarkerTask")
     ]
@@ -102,6 +107,12 @@ def run_inverse_kinematics_tool(job: Job, outcome: Outcome) -> None:
         if names:
             outcome.summary[key] = names
             outcome.add_message(category, join_words(names))
+
+
+def _add_fit_messages(outcome: Outcome, noun: str, messages: Iterable[str]) -> None:
+    """Add messages about a fit, with the name of what each is about."""
+    for message in messages:
+        outcome.add_message("coordinates" if message.startswith(UNDETERMINED) else noun, message)
 
 
 def run_scale_tool(job: Job, outcome: Outcome) -> None:
@@ -125,8 +136,7 @@ def run_scale_tool(job: Job, outcome: Outcome) -> None:
         outcome.add_message("mass", result.describe_mass())
     if result.placed is not None:
         outcome.summary |= result.placed.pose.summary
-        for message in result.placed.describe_pose():
-            outcome.add_message("markers", message)
+        _add_fit_messages(outcome, "markers", result.placed.describe_pose())
 
 
 def run_imu_placer(job: Job, outcome: Outcome) -> None:
@@ -235,8 +245,7 @@ def run_imu_inverse_kinematics_tool(job: Job, outcome: Outcome) -> None:
         angles=motion.orientation_errors,
     )
     outcome.summary |= motion.summary
-    for message in describe_fit(motion):
-        outcome.add_message("sensors", message)
+    _add_fit_messages(outcome, "sensors", describe_fit(motion))
     if ignored_names := [name for name in data.names if name not in frames]:
         outcome.add_message(
             "left out", f"{join_words(ignored_names)}: the model has no frames with these names"

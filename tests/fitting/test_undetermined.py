@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gzip
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +13,7 @@ import pytest
 import osimlite
 from osimlite.fitting.fit_messages import describe_fit
 from osimlite.fitting.marker_data import MarkerData
+from tests.cli.command import run
 from tests.labs import LABS, change, copy_lab
 
 MARKERS = ("ASI", "PSI", "SAC", "THI", "KNE", "TIB", "ANK", "TOE")
@@ -80,3 +83,16 @@ def test_a_motion_of_one_frame() -> None:
     )
     assert motion.undetermined == ("knee_angle",)
     assert np.isfinite(motion.values).all()
+
+
+def test_the_summary_of_a_setup_names_undetermined_coordinates(tmp_path: Path) -> None:
+    fixtures = Path(__file__).parents[2] / "fixtures" / "setups"
+    for name in ("scale.xml", "markers.xml", "walk.trc"):
+        shutil.copy(fixtures / name, tmp_path)
+    (tmp_path / "model.osim").write_bytes(
+        gzip.decompress((fixtures / "model.osim.gz").read_bytes())
+    )
+    lines = run("run", "scale.xml", folder=tmp_path).out.splitlines()
+    (line,) = [line for line in lines if "no measurement determines" in line]
+    assert line.startswith("coordinates ")
+    assert any(line.startswith("mass ") and "to 72.6 kg" in line for line in lines)
