@@ -82,7 +82,7 @@ async def test_what_a_word_means(client, walker) -> None:
     assert "Hertz" in await hover('<HuntCrossleyForce name="RFootForce"', 3)
     velocity = await hover("<transition_velocity>", 4)
     assert "one number in m/s, > 0; by default `0.01`" in velocity
-    assert "Slip at which friction is static" in velocity
+    assert "Slip velocity of static friction" in velocity
     assert "ContactSphere `/contactgeometryset/RFootContact`" in await hover(
         "RFootContact Platform", 4
     )
