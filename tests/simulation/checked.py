@@ -1,4 +1,4 @@
-"""Kernels as Python on vectors where a place outside is an error: machine code would read or write there."""
+"""Kernels as Python on vectors with bounds, where machine code would access other memory."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from osimlite.simulation.engines import linking
 
 
 class Bounded(np.ndarray[Any, Any]):
-    """A vector that refuses the negative places that numpy counts from the end."""
+    """Vector that rejects negative indices, which numpy would count from the end."""
 
     def __getitem__(self, place: Any) -> Any:
         return super().__getitem__(_inside(place))
@@ -21,7 +21,7 @@ class Bounded(np.ndarray[Any, Any]):
 
 def _inside(place: Any) -> Any:
     if type(place) is int and place >= 0:
-        # Millions of times.
+        # This function is called millions of times, so test the common case first.
         return place
     ends = (place.start, place.stop) if isinstance(place, slice) else (place,)
     if any(isinstance(end, int | np.integer) and end < 0 for end in ends):
@@ -30,7 +30,7 @@ def _inside(place: Any) -> Any:
 
 
 class Checked(linking._PythonCode):
-    """Kernels as Python on such vectors."""
+    """Kernels as Python on bounded vectors."""
 
     def get_entry(self, function: str) -> Any:
         kernel = super().get_entry(function)

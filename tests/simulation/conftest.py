@@ -1,4 +1,4 @@
-"""The walker, OpenSim's converged motion of it, and our motion at high accuracy."""
+"""Fixtures: the walker, OpenSim's converged motion of it, and osimlite's motion at high accuracy."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ Table = dict[str, "np.ndarray[Any, Any]"]
 
 @pytest.fixture(scope="session")
 def walker() -> Model:
-    """The dynamic walker as OpenSim wrote it, which no test of this folder changes."""
+    """Return the dynamic walker as OpenSim wrote it; no test of this folder changes it."""
     return read_walker()
 
 
 @pytest.fixture(scope="session")
 def reference(fixtures: Path) -> Callable[[str], Table]:
-    """Columns of a reference table by their labels."""
+    """Return a function that reads the columns of a reference table by their labels."""
 
     def table(name: str) -> Table:
         text = gzip.decompress(
@@ -40,7 +40,7 @@ def reference(fixtures: Path) -> Callable[[str], Table]:
 
 @pytest.fixture(scope="session")
 def simulation(walker: Model) -> Iterator[Any]:
-    """The walker made ready, Bullet choosing the route."""
+    """Yield a simulation of the walker by PyBullet, with the default route to accelerations."""
     from osimlite.simulation import Simulation
 
     with Simulation(walker) as ready:
@@ -49,5 +49,5 @@ def simulation(walker: Model) -> Iterator[Any]:
 
 @pytest.fixture(scope="session")
 def precise(simulation: Any) -> Any:
-    """The walker's first two seconds at accuracy 1e-9, every millisecond."""
+    """Return the first two seconds of the walker at accuracy 1e-9, with a row every millisecond."""
     return simulation.run(2.0, accuracy=1e-9, report_interval=1e-3)

@@ -1,4 +1,4 @@
-"""A model whose dampers keep count of the energy that they take up."""
+"""Model with dampers that integrate the dissipated energy."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ STATES = [
     "/forceset/locked_stop/dissipatedEnergy",
     "/forceset/disc/dissipated_energy",
 ]
-"""What OpenSim calls them, in its order."""
+"""Paths of the dissipated energies in OpenSim, in its order."""
 
 
 def damped() -> Model:
-    """Two pendulums on a slide between bushings, with stops, and a locked coordinate with one."""
+    """Return two pendulums on a slide between bushings, with stops, and a locked coordinate with a stop."""
     model = Model(name="damped")
     below = model.ground
     for number, kind in enumerate((SliderJoint, PinJoint, PinJoint, PinJoint)):

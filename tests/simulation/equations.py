@@ -1,4 +1,4 @@
-"""Equations of motion whose solution is known, and any others in the place of a mechanism."""
+"""Equations of motion with known solutions, and an engine that integrates any equations."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from osimlite.simulation.pack import PackedModel
 
 
 def oscillator(t, y):
-    """Unit mass on a unit spring: q = cos t from (1, 0)."""
+    """Differentiate a unit mass on a unit spring: q = cos t from (1, 0)."""
     return [y[1], -y[0]]
 
 
@@ -27,7 +27,7 @@ def pendulum(t, y):
 
 
 def cannon(t, y):
-    """Quadratic drag: u = tanh t from rest."""
+    """Differentiate a fall with quadratic drag: u = tanh t from rest."""
     return [y[1], 1.0 - y[1] * y[1]]
 
 
@@ -38,7 +38,7 @@ def last(pairs):
 
 
 class Counting:
-    """A derivative that remembers how often and where it was called."""
+    """Derivative function that counts its calls and remembers the last arguments."""
 
     def __init__(self, f):
         self.f = f
@@ -52,7 +52,7 @@ class Counting:
 
 
 class Equations:
-    """An engine whose derivatives come from a function of (t, y), with n values and n speeds and any further states."""
+    """Engine whose derivatives are a function of (t, y), with n coordinates, n speeds and further states."""
 
     contacts = ()
 
@@ -83,6 +83,16 @@ class Equations:
 def runge_kutta_merson(
     f, t: float, y: Any, n: int, *, observe: Any = None, accuracy: float = 1e-3, **options: Any
 ):
-    """Runge-Kutta-Merson on any equations."""
+    """Return a Runge-Kutta-Merson integrator of any equations.
+
+    Args:
+        f: derivative function of (t, y).
+        t: initial time.
+        y: initial state.
+        n: number of coordinates.
+        observe: function that is called after each step.
+        accuracy: accuracy of the integrator.
+        options: further arguments of `Equations`.
+    """
     engine: Any = Equations(f, len(y), n, **options)
     return ControlledSteps(engine, t, y, IntegrationOptions(accuracy=accuracy), observe)

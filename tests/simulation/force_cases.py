@@ -1,4 +1,4 @@
-"""A chain of bodies, and every force that can act on it, by what is told apart."""
+"""Chain of bodies, and forces of all classes and variants on it."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ from osimlite.schema.wrap_types import WrapCylinder, WrapSphere
 
 
 def chain() -> Model:
-    """Three bodies in space: a free one, a ball joint, a pin; and one on a locked slide."""
+    """Return a chain with a free body, a ball joint, a pin, and a locked slide."""
     model = Model(name="chain")
     joints = (osimlite.FreeJoint, osimlite.BallJoint, osimlite.PinJoint, osimlite.SliderJoint)
     carrier = model.ground
@@ -131,7 +131,7 @@ OBSTACLES = (
 
 
 def over(path, surfaces) -> Scholz2015GeometryPath:
-    """The path over surfaces between its last two points."""
+    """Return the path with surfaces between its last two points."""
     result = Scholz2015GeometryPath(name="path")
     for point in path.path_point_set.objects:
         result.path_elements.append(
@@ -182,7 +182,7 @@ def contact(*surfaces):
 
 
 def driven(actuator, *functions):
-    """An actuator with a controller for each function."""
+    """Return a tuple of an actuator and one controller for each function."""
     result = [actuator]
     for number, function in enumerate(functions):
         controller = PrescribedController(name=f"c{number}", socket_actuators=("/forceset/a",))
@@ -453,13 +453,12 @@ FORCES = {
     "prescribed in the body": lambda: pushed(forceIsGlobal=False, pointIsGlobal=False),
 }
 
-# Its path is found on three surfaces at once, which takes half as long as all other forces
-# together.
+# The path over three surfaces takes half as long as all other forces together.
 FORCE_NAMES = [
     pytest.param(name, marks=pytest.mark.full) if name == "path over obstacles" else name
     for name in FORCES
 ]
-"""The forces as parameters of a test."""
+"""Names of all forces as parameters of a test."""
 
 
 def with_force(make) -> Model:

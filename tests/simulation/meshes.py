@@ -1,4 +1,4 @@
-"""Mesh files made for tests."""
+"""Mesh files for tests."""
 
 from __future__ import annotations
 
@@ -12,7 +12,13 @@ Faces = list[tuple[int, ...]]
 
 
 def ball(radii: Sequence[float], around: int = 10, along: int = 6) -> tuple[np.ndarray, Faces]:
-    """A closed ellipsoid of quadrilaterals with fans of triangles at its poles."""
+    """Return points and faces of a closed ellipsoid of quadrilaterals, with triangles at its poles.
+
+    Args:
+        radii: half axes (m).
+        around: number of faces around the axis.
+        along: number of rings of faces from pole to pole.
+    """
     rings = [
         (np.sin(a) * np.cos(b), np.sin(a) * np.sin(b), np.cos(a))
         for a in np.pi * np.arange(1, along) / along
@@ -30,7 +36,7 @@ def ball(radii: Sequence[float], around: int = 10, along: int = 6) -> tuple[np.n
 
 
 def block(sizes: Sequence[float]) -> tuple[np.ndarray, Faces]:
-    """A prism on a hexagon, with its two hexagons as they are."""
+    """Return points and faces of a hexagonal prism, whose hexagons are not divided."""
     around = 2.0 * np.pi * np.arange(6) / 6
     ends = [(np.cos(b), np.sin(b), z) for z in (-1.0, 1.0) for b in around]
     sides = [(k, (k + 1) % 6, 6 + (k + 1) % 6, 6 + k) for k in range(6)]
@@ -38,7 +44,7 @@ def block(sizes: Sequence[float]) -> tuple[np.ndarray, Faces]:
 
 
 def triangles(points: np.ndarray, faces: Faces) -> np.ndarray:
-    """Corners (t, 3, 3): every face as a fan about its first corner."""
+    """Return the corners (t, 3, 3) of triangles, with each face as a fan around its first corner."""
     result = [(face[0], face[k], face[k + 1]) for face in faces for k in range(1, len(face) - 1)]
     return points[np.array(result)]
 
@@ -83,4 +89,4 @@ def write_text_stl(path: Path, points: np.ndarray, faces: Faces) -> None:
 
 
 WRITERS = {".obj": write_obj, ".vtp": write_vtp, ".stl": write_stl, ".stla": write_text_stl}
-"""How to write a mesh file of each kind."""
+"""Writer of mesh files for each suffix."""

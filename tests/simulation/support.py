@@ -1,4 +1,4 @@
-"""Models, data and comparisons that several test modules of this package share."""
+"""Models, states and comparisons for the tests of simulation."""
 
 from __future__ import annotations
 
@@ -71,7 +71,13 @@ MOTIONS = {name: make_plain_motions(getattr(osimlite, name)) for name in PLAIN_J
 
 
 def cable(*elements, surface=None, slides=0.0):
-    """A path from left to right over a surface in ground; its right end slides to the right."""
+    """Return a model with a cable from left to right over a surface in ground; its right end moves on a slider.
+
+    Args:
+        elements: points and obstacles of the path.
+        surface: contact geometry of the obstacle.
+        slides: default value of the slider (m).
+    """
     model = osimlite.Model(name="cable")
     body = model.add(osimlite.Body(name="b", mass=1.0, inertia=(1, 1, 1, 0, 0, 0)))
     slide = osimlite.Coordinate(name="x", default_value=slides)
@@ -133,10 +139,13 @@ CONSTANT = (f.ConstantValue, f.PiecewiseConstant)
 
 
 def custom_joint(function):
-    """One coordinate drives a rotation and two translations by a function, two more move axes together."""
+    """Return the motions of a custom joint with three coordinates.
+
+    One drives a rotation and a translation by `function`; the two others share axes.
+    """
     both = f.MultivariatePolynomial.complete((0.1, 0.2, -0.3, 0.4, 0.5, -0.2), 2, 2)
     turns = (
-        # What is constant moves no mass.
+        # A constant rotation would leave a coordinate that moves no mass.
         JointAxis((0,), AXES[0], f.Linear() if isinstance(function, CONSTANT) else function),
         JointAxis((1,), AXES[1], f.Linear()),
         JointAxis((1, 2), AXES[2], f.WeightedSum((0.4, 1.1), 0.2)),
@@ -159,7 +168,14 @@ JOINTS = {
 
 
 def tree(joints, *, parents=None, reversed=(), locked=()):
-    """A mechanism of bodies of odd inertia."""
+    """Return a mechanism of bodies with different inertias.
+
+    Args:
+        joints: name of the joint of each body.
+        parents: index of the parent of each body; by default a chain.
+        reversed: indices of the bodies whose joint is reversed.
+        locked: indices of locked coordinates.
+    """
     bodies, coordinates = [], []
     for number, name in enumerate(joints):
         motions = MOTIONS["WeldJoint"] if name == "WeldJoint" else JOINTS[name]
@@ -184,7 +200,7 @@ def tree(joints, *, parents=None, reversed=(), locked=()):
 
 
 def engines(model, **settings):
-    # Models and states of this module also serve tests in environments without PyBullet.
+    # Import here: models and states of this module also serve tests in environments without PyBullet.
     from osimlite.simulation.engines.bullet.engine import BulletEngine
 
     mechanism = build_mechanism(model)
@@ -208,7 +224,7 @@ def assert_close(ours, theirs, tolerance=1e-9):
 
 
 def assert_same(mechanism, ours, theirs, count=8) -> int:
-    """Compare at some states; returns the bits of the contacts that touched."""
+    """Compare two engines at random states; return the bits of the contacts that touched."""
     touched = 0
     assert (ours.contacts, ours.columns) == (theirs.contacts, theirs.columns)
     for t, q, u in states(mechanism, count):
@@ -231,7 +247,7 @@ INERTIA = (0.02, 0.03, 0.025, 0.001, -0.002, 0.003)
 
 
 def knee(*, opensim_derivatives: bool, inertia: Any = None) -> Mechanism:
-    """A shank whose one coordinate drives three rotations and two translations, upside down in the tree."""
+    """Return a shank on a reversed joint, one coordinate of which drives three rotations and a translation."""
     axes = [
         JointAxis((0,), (0.0, 0.0, 1.0), f.IDENTITY),
         JointAxis((0,), (1.0, 0.1, 0.0), f.Polynomial((0.3, 0.5, 0.1))),
@@ -264,7 +280,7 @@ def add(model: Model, name: str, joint: Any, carrier: Any, at=(0, 0, 0), **more:
 
 
 def pins(count: int, length: float = 0.4) -> tuple[Model, list[Body]]:
-    """A chain of pendulums."""
+    """Return a chain of pendulums, and its bodies."""
     model = Model(name="pins")
     bodies: list[Body] = []
     for number in range(count):
@@ -283,7 +299,7 @@ def constrain(model: Model, constraint: Any) -> Model:
 
 
 def four_bars() -> Model:
-    """Three pins, and the end of the last bar on a point of ground."""
+    """Return three bars on pins, with the end of the last bar fixed to a point of ground."""
     model, bodies = pins(3)
     return constrain(
         model,
@@ -295,7 +311,7 @@ def four_bars() -> Model:
 
 
 def patella() -> Model:
-    """A thigh and shank on splines, and a patella that a coupler moves."""
+    """Return a thigh and a shank on splines, and a patella that a coupler moves."""
     model, _ = pins(1)
     thigh = next(iter(model.components(Body)))
     joint = CustomJoint(name="knee", coordinates=[Coordinate(name="flexion", default_value=-0.4)])
@@ -345,7 +361,7 @@ def bead() -> Model:
 
 
 def welded() -> Model:
-    """A loop of four bars whose end is welded to a block that slides: most of the six equations say it twice."""
+    """Return a four-bar loop whose end is welded to a sliding block; most of the six equations are redundant."""
     model, bodies = pins(3)
     slider = add(model, "block", osimlite.PlanarJoint(name="plane"), model.ground)
     return constrain(
@@ -365,7 +381,7 @@ MODELS = {make.__name__: make for make in (four_bars, patella, rod, bead, welded
 
 
 def arm() -> Model:
-    """Two pendulums on a slide."""
+    """Return a double pendulum on a slide."""
     model = Model(name="arm")
     below = model.ground
     for number, kind in enumerate((SliderJoint, PinJoint, PinJoint)):
@@ -383,7 +399,13 @@ def arm() -> Model:
 
 
 def thrown(folder, *, dissipation=0.0, friction=0.0) -> Model:
-    """An egg that falls on a hexagonal stone, which stands on the floor it may reach too."""
+    """Return a model of an egg that falls on a hexagonal stone, which stands on a floor in its reach.
+
+    Args:
+        folder: folder of the mesh files.
+        dissipation: dissipation of the contacts (s/m).
+        friction: coefficient of friction.
+    """
     write_obj(folder / "egg.obj", *ball((0.15, 0.1, 0.1), 12, 8))
     write_obj(folder / "stone.obj", *block((0.2, 0.2, 0.2)))
     model = Model(name="thrown")
@@ -427,7 +449,7 @@ PATH = "/forceset/p"
 
 
 def wrapped(setup) -> Model:
-    """A path from body A over points and surfaces of body W to body B; each body is free."""
+    """Return a path from body A over points and surfaces of body W to body B; each body is free."""
     model = Model(name="wraps")
     bodies = {
         name: model.add(Body(name=name, mass=1.0, inertia=(1, 1, 1, 0, 0, 0))) for name in "ABW"

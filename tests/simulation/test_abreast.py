@@ -1,4 +1,4 @@
-"""Muscles whose curves are asked together, beside each by itself: the same to the last bit."""
+"""Tests of muscles whose curves are evaluated in batches: bits equal those of single evaluations."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from osimlite.simulation.run import Simulation
 
 
 def changed(model):
-    """With muscles of all sorts beside one another, some of which answer to their stretch."""
+    """Give neighbouring muscles of a model different options, some of them damping, and return the model."""
     for number, muscle in enumerate(model.components(Millard2012EquilibriumMuscle)):
         muscle.fiber_damping = (0.1, 0.0, 0.05, 0.1, 0.0)[number % 5]
         muscle.ignore_tendon_compliance = number % 5 in (3, 4)
@@ -23,7 +23,7 @@ def changed(model):
 
 
 def alone(engine):
-    """The same engine, in which every item is computed by itself."""
+    """Make an engine compute every item individually, and return it."""
     ints = engine.program.ints
     runs = range(ints[MODEL.RUN_AT], ints[MODEL.RUN_AT] + RUN.SIZE * ints[MODEL.RUNS], RUN.SIZE)
     assert any(ints[run + RUN.LAW] for run in runs)

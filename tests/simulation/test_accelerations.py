@@ -1,4 +1,4 @@
-"""Accelerations through the engine, by both routes."""
+"""Tests of accelerations by the PyBullet engine, with both routes."""
 
 from __future__ import annotations
 
@@ -41,13 +41,13 @@ def cases(fixtures):
 
 
 def within(ours, expected, tolerance=1e-9):
-    """Relative to the largest acceleration of the state."""
+    """Return whether an error is within a tolerance relative to the largest acceleration, or to one."""
     error = np.abs(np.subtract(ours, expected)).max()
     return error <= tolerance * max(1.0, np.abs(expected).max())
 
 
 def walker_at(fixtures, angle, *, locked=True):
-    """The walker with its platform held at an angle, or free."""
+    """Return the walker with its platform at an angle, locked or free, and its mechanism."""
     model = osimlite.read(fixtures / "walker" / "DynamicWalkerModel.osim")
     platform = next(item for item in model.components(Coordinate) if item.name == "platform_rz")
     platform.default_value, platform.locked = angle, locked
@@ -111,7 +111,7 @@ def test_force_records(fixtures, cases):
 
 # ------------------------------------------------------------------------------------- joints of every kind
 def chain(*joint_types, spheres=(), inertia=(0.02, 0.03, 0.025, 0.001, -0.002, 0.003)):
-    """Bodies in a row, each on a joint of another type, over a tilted half space in ground."""
+    """Return bodies in a chain, each on a joint of another type, over a tilted half space in ground."""
     model = Model(name="chain")
     carrier = model.ground
     for number, joint_type in enumerate(joint_types):

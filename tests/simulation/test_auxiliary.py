@@ -1,4 +1,4 @@
-"""The energy that dampers take up: a state of its own, whose error counts as it does in OpenSim."""
+"""Tests of the energy that dampers dissipate: a state whose error counts as in OpenSim."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def test_what_is_taken_up_is_lost(engine):
     assert list(trajectory.auxiliary) == STATES
     slack, stop, locked, disc = trajectory.auxiliary.values()
     assert not slack.any() and not locked.any()
-    # The stop that keeps no count takes up energy too.
+    # The stop that does not integrate its energy dissipates energy too.
     lost = trajectory.energy["total"][0] - trajectory.energy["total"]
     counted = stop + disc
     assert (np.diff(stop) >= -1e-15).all() and (np.diff(disc) > 0.0).all()

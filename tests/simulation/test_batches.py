@@ -1,4 +1,4 @@
-"""Many runs at once: the same as one by one, on any number of threads; watches, reports, failures."""
+"""Tests of batches of runs: results equal single runs on any number of threads; events, reports, failures."""
 
 from __future__ import annotations
 
@@ -177,7 +177,7 @@ def test_a_touch_ends_a_run(engine, starts):
     ],
 )
 def test_settings_without_meaning_are_refused(engine, starts, settings, why):
-    """The machine code would go on with some of them forever."""
+    """With some of these settings, machine code would never end."""
     with pytest.raises(SettingError, match=why):
         run_many(engine, starts[:1], **{"to": 0.1, **settings})
 

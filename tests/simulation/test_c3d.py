@@ -1,4 +1,4 @@
-"""Forces out of .c3d files: what the plates measured, and loads of it."""
+"""Tests of forces from .c3d files: measurements of force plates, and external loads from them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from osimlite.simulation.elements.external_loads import read_external_loads
 pytest.importorskip("ezc3d", reason="needs ezc3d (extra 'c3d')")
 
 TRIALS = Path(__file__).parents[2] / "fixtures" / "trials"
-"""Trials of one marker over 5 frames at 100 Hz; plates measured at 1 kHz."""
+"""Trials of one marker over 5 frames at 100 Hz, with force plates at 1 kHz."""
 LOADS = """<OpenSimDocument Version="40600">
     <ExternalLoads name="loads">
         <objects>
@@ -39,7 +39,7 @@ LOADS = """<OpenSimDocument Version="40600">
 
 
 def measured() -> Any:
-    """What each channel of the plate of `force_plate.c3d` measured (6, 50), N and N·mm."""
+    """Return the measurements (6, 50) of the channels of the plate in `force_plate.c3d` (N and N·mm)."""
     steps = np.arange(50)
     return np.array(
         [10.0 + steps, 20.0 - steps, -700.0 - steps, 1e3 + steps, 2e3 - steps, 3e3 + 2 * steps]
@@ -47,7 +47,7 @@ def measured() -> Any:
 
 
 def test_forces_are_those_of_the_plate() -> None:
-    """The plate looks downwards, its origin is 4 cm below its surface: moments are those about its middle."""
+    """The plate faces downwards, 4 cm above its origin; moments are about the centre of its surface."""
     x, y, z, mx, my, mz = measured()
     table = read_c3d_forces(TRIALS / "force_plate.c3d")
     assert table.columns == tuple(f"{letter}1_{axis}" for letter in "fpm" for axis in "xyz")

@@ -1,4 +1,4 @@
-"""What is said of paths over obstacles that make no sense; the numbers are held to OpenSim's in `tests/oracle`."""
+"""Tests of errors about paths over obstacles that make no sense; `tests/oracle` compares lengths with OpenSim's."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_a_surface_that_no_path_runs_over():
 
 @pytest.mark.parametrize("hint", [(nan, nan, nan), (0.0, 0.1, 0.0)])
 def test_a_path_beside_a_half_space_is_straight(hint: tuple[float, float, float]):
-    """OpenSim lays the path on the plane at the hint, from which it lifts off at once."""
+    """OpenSim starts the search on the plane at the hint, from where the path lifts off at once."""
     plane = ContactHalfSpace(location=(0, -0.5, 0), orientation=(0, 0, -pi / 2))
     beside, alone = (
         osimlite.paths(cable(LEFT, *between, RIGHT, surface=plane))
@@ -71,7 +71,7 @@ def test_a_point_inside_a_half_space():
 
 
 def test_shortest():
-    """Around a cylinder, and beside it."""
+    """Compare the path around a cylinder, and the path next to it, with their analytical lengths."""
     up, down = (point(frame, x, 0, 0) for frame, x in (("/ground", -0.3), ("/bodyset/b", 0.0)))
     paths = osimlite.paths(cable(up, over((0, 0.1, 0)), down, surface=ContactCylinder(radius=0.1)))
     shortest = 2 * sqrt(0.3**2 - 0.1**2) + 0.1 * (pi - 2 * acos(0.1 / 0.3))
@@ -83,7 +83,7 @@ def test_shortest():
 
 
 def test_a_point_that_gets_into_an_obstacle():
-    """OpenSim throws in the middle of the motion."""
+    """OpenSim throws an exception in the middle of the motion."""
     model = cable(LEFT, over(), RIGHT, surface=ContactSphere(radius=0.1, location=(0, -0.01, 0)))
     with pytest.raises(IntegrationError, match="there is no solution for '/forceset/s'"):
         osimlite.simulate(model, to=3.0, engine="compiled", accuracy=1e-3)

@@ -1,6 +1,6 @@
-"""The compiled engine: accelerations of our own recursion and of PyBullet, the steps and motion of OpenSim.
+"""Tests of the compiled engine: accelerations by the recursion and by PyBullet, steps and motion of OpenSim.
 
-Compiling takes half a minute where the cache is empty; all tests here use the same machine code.
+Without cached kernels, compilation takes half a minute; all tests here use the same machine code.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ NO_BULLET = "needs pybullet (extra 'bullet')"
 
 
 def within(ours, expected, tolerance=1e-9):
-    """Relative to the largest acceleration of the state."""
+    """Return whether an error is within a tolerance relative to the largest acceleration, or to one."""
     error = np.abs(np.subtract(ours, expected)).max(initial=0.0)
     return error <= tolerance * max(1.0, np.abs(expected).max(initial=0.0))
 
@@ -111,7 +111,7 @@ def test_mixed_joints_of_a_file(fixtures):
 
 # ---------------------------------------------------------------------------------------------------- forces
 def contact_chain():
-    """Two bodies with spheres on them over a tilted half space."""
+    """Return two bodies with spheres over a tilted half space."""
     model = Model(name="chain")
     carrier, surfaces = model.ground, []
     for number, kind in enumerate((osimlite.FreeJoint, osimlite.BallJoint)):
@@ -185,7 +185,7 @@ def test_forces_are_those_of_the_bullet_engine():
             assert ours.compute_energies(0.0, y) == pytest.approx(
                 bullet.compute_energies(0.0, z), rel=1e-9, abs=1e-12
             )
-    # With the floor and with one another.
+    # The spheres touched the floor and each other.
     assert touched.bit_count() > 3
 
 
@@ -248,13 +248,13 @@ def test_same_motion_and_reports_as_with_bullet(fast, simulation):
 
 
 def test_steps_are_those_of_opensim(fast):
-    """OpenSim's Manager takes 135 of 173 steps and 828 evaluations with its default settings."""
+    """With default settings, OpenSim's Manager takes 135 of 173 steps and 828 evaluations."""
     summary = fast.run(2.0).summary
     assert (summary["steps"], summary["attempted_steps"], summary["evaluations"]) == (135, 173, 828)
 
 
 def test_steps_one_by_one_are_those_of_a_whole_motion(fast):
-    """To the last bit."""
+    """The states are equal to the last bit."""
     y = fast.initial_state({}, {})
     ours, theirs = (
         fast.engine.make_stepper(0.0, y, EngineSettings(accuracy=1e-5), lambda t, y: None)
@@ -270,7 +270,7 @@ def test_steps_one_by_one_are_those_of_a_whole_motion(fast):
 
 
 def test_kernels_are_what_they_mean_in_python(fast, fixtures):
-    """The same numbers to the last bit, with joints of all kinds and contact."""
+    """Bits are equal to those of Python, for joints of all kinds and for contact."""
     mixed = build_mechanism(osimlite.read(fixtures / "kinematics" / "mixed_joint_tree.osim"))
     for engine in (fast.engine, CompiledEngine(mixed, Forces(()))):
         python = System(engine.mechanism, engine.forces, code=PYTHON_CODE)
@@ -331,7 +331,7 @@ def test_gimbal_lock_is_named(engine):
 
 
 def test_why_there_is_no_step_is_told_late_too():
-    """Where the shortest steps are hardly longer than the rounding of the time."""
+    """The shortest steps are hardly longer than the rounding error of the time here."""
     model = Model(name="m")
     coordinate = Coordinate(name="turn", prescribed=True)
     coordinate.prescribed_function = PiecewiseConstantFunction(x=(0.0, 5.5), y=(0.1, 0.4))
@@ -366,7 +366,7 @@ def test_window_and_route_are_refused(walker):
 
 
 def test_without_machine_code_the_kernels_run_as_python(fixtures, fast):
-    """Slowly, to the same digits."""
+    """The states are equal to the last bit."""
     program = (
         "import osimlite; "
         f"model = osimlite.read({str(fixtures / 'walker' / 'DynamicWalkerModel.osim')!r}); "

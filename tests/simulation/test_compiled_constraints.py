@@ -1,4 +1,4 @@
-"""Constraints, prescribed and partly locked coordinates in the compiled engine: as with the other engine."""
+"""Tests of constraints, prescribed and partly locked coordinates in the compiled engine, against the recursion."""
 
 from __future__ import annotations
 
@@ -60,11 +60,11 @@ def test_any_mechanism(case: Case, kind: str, seed: int, locks: int):
         expected = mechanism.acceleration(case.q, u, time=0.7)
     except SimulationError:
         return
-    # What no speeds fulfil, no accelerations need to.
+    # If no speeds fulfil the constraints, accelerations need not either.
     rows = [item.velocity_equations(mechanism.at(case.q, u, 0.7)) for item in mechanism.constraints]
     if any(np.abs(matrix @ u - wanted).max(initial=0.0) > 1e-9 for matrix, wanted in rows):
         return
-    # An almost impossible demand makes any result uncertain.
+    # Nearly contradictory constraints make any result uncertain.
     scale = max(1.0, float(np.abs(expected).max()), float(np.abs(u).max()) ** 2)
     assume(scale < 1e5)
     assert np.abs(accelerations(mechanism, case.q, u, 0.7) - expected).max() < 1e-9 * scale
@@ -180,7 +180,7 @@ def test_reports_between_steps_fulfil_the_constraints(make: Any):
         ]
         rows = [item.velocity_equations(state) for item in mechanism.constraints]
         slips += [float(np.sum((matrix @ u - wanted) ** 2)) for matrix, wanted in rows]
-    # The root mean square of at most seven equations.
+    # The tolerance is that of the root mean square of at most seven equations.
     assert max(*errors, *slips) < 7.0 * (accuracy / 10.0) ** 2
 
 
@@ -195,7 +195,7 @@ def test_fixed_steps(make: Any):
 
 @pytest.mark.parametrize("make", ALL.values(), ids=ALL)
 def test_kernels_are_what_they_mean_in_python(make: Any):
-    """The same numbers to the last bit: accelerations and projections."""
+    """Accelerations and projections have the bits of Python."""
     with Simulation(make(), "compiled") as simulation:
         engine: Any = simulation.engine
         y = np.array(simulation.initial_state({}, {}))
@@ -216,7 +216,7 @@ def test_kernels_are_what_they_mean_in_python(make: Any):
 # ------------------------------------------------------------------------------------------------- many at once
 @pytest.fixture(scope="module")
 def loop() -> Any:
-    """Four bars with a stop on the first joint."""
+    """Yield a simulation of four bars with a stop on the first joint."""
     model = four_bars()
     stop = CoordinateLimitForce(
         name="stop",
@@ -232,7 +232,7 @@ def loop() -> Any:
 
 
 def nearest(engine: Any, y: Any) -> Any:
-    """The state nearest to y where the constraints of pins hold; a change of a speed above 1 counts relative to it."""
+    """Return the nearest state to y that fulfils the constraints of pins; changes of speeds above 1 are relative."""
     mechanism, order = engine.mechanism, list(engine.order)
     x, u = np.split(y.copy(), 2)
     for _ in range(10):

@@ -1,4 +1,4 @@
-"""Every force of the compiled engine is that of the PyBullet engine: accelerations, records, energies, loads."""
+"""Tests of all forces of the compiled engine against the PyBullet engine: accelerations, records, energies, loads."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ IDLE = {
 
 @pytest.fixture(scope="module")
 def without_force():
-    """The chain of the cases without a force, as a compiled engine."""
+    """Return the chain without a force as a compiled engine."""
     _, ours, theirs = engines(chain())
     theirs.close()
     return ours
@@ -59,7 +59,7 @@ def without_force():
 def test_force(name, monkeypatch, without_force):
     mechanism, ours, theirs = engines(with_force(FORCES[name]))
     if name not in IDLE:
-        # What is compared is not nothing against nothing.
+        # The force has an effect, so that the comparison below means something.
         assert any(
             ours.compute_accelerations(*state) != without_force.compute_accelerations(*state)
             for state in states(mechanism, 8)
@@ -67,9 +67,9 @@ def test_force(name, monkeypatch, without_force):
     with theirs:
         touched = assert_same(mechanism, ours, theirs)
         assert touched or not ours.contacts
-    # As Python, the same kernels give the same bits, and look nowhere that is not theirs.
+    # As Python, the kernels give the same numbers, and access only their own vectors.
     python = System(mechanism, ours.forces, code=PYTHON_CODE)
-    # Its records are what each evaluation leaves: as Python, another takes long.
+    # Records remain from the last evaluation; another evaluation in Python would take long.
     monkeypatch.setattr(python, "compute_applied_forces", lambda t, y: None)
     for t, q, u in states(mechanism, 2):
         y = ours.state.pack(q, u)
@@ -79,12 +79,12 @@ def test_force(name, monkeypatch, without_force):
 
 
 def test_all_at_once():
-    """Together they are the sum of each: no one's numbers are in another's place."""
+    """All forces together are the sum of the forces, so that none uses numbers of another one."""
     model = chain()
     for index, (name, make) in enumerate(FORCES.items()):
         made = make()
         if "actuator" in name or name in ("station", "path over obstacles"):
-            continue  # others name them by a path
+            continue  # others refer to them by a path
         for item in made if isinstance(made, tuple | list) else (made,):
             item.name = f"{item.name}{index}"
             if isinstance(item, HuntCrossleyForce):
@@ -102,7 +102,7 @@ def test_all_at_once():
 
 
 def test_every_class_of_force_is_here():
-    """But for what needs a file, and muscles and others with states of their own, which have tables of numbers."""
+    """Classes that need files, and muscles and others with states, have tests of their own."""
     made = {"ElasticFoundationForce", "ExternalForce"}
     for make in FORCES.values():
         result = make()
@@ -119,7 +119,7 @@ def test_every_class_of_force_is_here():
 
 
 def test_measured_load():
-    """A force and a torque along the axes of one body, at a point of another, on a third."""
+    """Apply a force and a torque along the axes of one body, at a point of another, to a third."""
     mechanism = build_mechanism(chain())
     cubic = smoothing_spline((0.0, 0.5, 1.0, 1.5, 2.0), (0.3, -1.0, 2.0, 0.5, 0.1), 2, 0.0)
     functions = cubic, NumericLinear(2.0, -0.3), NumericConstant(0.4)
@@ -136,7 +136,7 @@ def test_measured_load():
 
 
 def test_early_return():
-    """Simbody's defect, in poses where the first contact separates faster than it pushes."""
+    """Compare Simbody's defect in poses where the first contact separates faster than it pushes."""
     model = with_force(lambda: contact(floor(), *(stone(number, 0.6) for number in range(4))))
     plain, defect = engines(model), engines(model, simbody_early_return=True)
     changed = 0
@@ -150,7 +150,7 @@ def test_early_return():
 
 
 def test_motion_of_a_driven_chain():
-    """The time goes into the steps."""
+    """Controls depend on time, so time must advance within steps."""
     model = with_force(FORCES["coordinate actuator"])
     ours, theirs = (
         osimlite.simulate(model, 0.5, engine, accuracy=1e-9) for engine in ("compiled", "bullet")

@@ -1,4 +1,4 @@
-"""Contact of meshes in machine code, against the PyBullet engine."""
+"""Tests of contact of meshes in machine code against the PyBullet engine."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def test_on_a_plane_and_a_sphere(tmp_path, monkeypatch):
 
 
 def test_meshes_on_each_other(tmp_path, monkeypatch):
-    """They are computed in Python, which machine code calls; what is raised there arrives."""
+    """Machine code calls Python for contact between meshes; exceptions there must reach the caller."""
     monkeypatch.chdir(tmp_path)
     model, surfaces = chain(), meshes(tmp_path)
     for surface in surfaces:

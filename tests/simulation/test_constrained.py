@@ -1,4 +1,4 @@
-"""Axes that follow functions, and constraints: accelerations by Bullet and by our recursion, energy, starts."""
+"""Tests of custom joints and constraints: accelerations by Bullet and by the recursion, energy, initial states."""
 
 from __future__ import annotations
 
@@ -63,11 +63,11 @@ def test_bullet_and_our_recursion_agree_on_any_mechanism(
         expected = mechanism.acceleration(case.q, u, time=0.7)
     except SimulationError:
         return
-    # What no speeds fulfil, no accelerations need to.
+    # If no speeds fulfil the constraints, accelerations need not either.
     rows = [item.velocity_equations(mechanism.at(case.q, u, 0.7)) for item in mechanism.constraints]
     if any(np.abs(matrix @ u - wanted).max(initial=0.0) > 1e-9 for matrix, wanted in rows):
         return
-    # An almost impossible demand makes any result uncertain.
+    # Nearly contradictory constraints make any result uncertain.
     scale = max(1.0, float(np.abs(expected).max()), float(np.abs(u).max()) ** 2)
     assume(scale < 1e5)
     result = accelerations(mechanism, case.q, u, 0.7)
@@ -167,7 +167,7 @@ def test_a_prescribed_coordinate_does_what_it_is_told():
 
 @pytest.mark.parametrize("slope", [0.0, 0.2])
 def test_a_ball_rolls_down_a_slope_as_it_should(slope: float):
-    """OpenSim's rolling constraint: the surface's X and Z axes carry the ball without slip, Y is up."""
+    """OpenSim's rolling constraint prevents slip along X and Z of the surface; its normal is Y."""
     radius, mass, moment = 0.3, 2.0, 0.06
     model = Model(name="ball", gravity=(9.81 * math.sin(slope), -9.81 * math.cos(slope), 0.0))
     body = model.add(Body(name="ball", mass=mass, inertia=(moment, moment, moment, 0, 0, 0)))
@@ -189,7 +189,7 @@ def test_a_ball_rolls_down_a_slope_as_it_should(slope: float):
     assert end["tx"] == pytest.approx(0.5 + 0.5 * a, abs=1e-7)
     assert end["rz"] == pytest.approx(-end["tx"] / radius, abs=1e-6)
     assert end["ty"] == pytest.approx(radius, abs=1e-8)
-    # As in OpenSim, it does nothing unless it is turned on.
+    # As in OpenSim, the constraint has no effect unless it is enforced.
     assert simulate(model, 0.1).summary["constraints"] == []
 
 

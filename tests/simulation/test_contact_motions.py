@@ -1,4 +1,4 @@
-"""Motions under the contact law whose end can be computed otherwise: a ball's bounce, a sliding block."""
+"""Tests of contact against analytical motions: a bouncing ball, a sliding block."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MASS, RADIUS, STIFFNESS, GRAVITY = 2.0, 0.1, 1e6, 9.80665
 
 
 def on_floor(*, gravity=GRAVITY, height=RADIUS, slope=0.0, **material) -> Model:
-    """A ball that does not turn over a half space, which descends along x; dissipation and friction as given."""
+    """Return a ball that does not rotate over a half space that descends along x, with these contact properties."""
     model = Model(name="floor", gravity=(0.0, -gravity, 0.0))
     body = model.add(Body(name="ball", mass=MASS, inertia=(0.01, 0.01, 0.01, 0, 0, 0)))
     joint = PlanarJoint(name="plane")
@@ -48,7 +48,7 @@ def on_floor(*, gravity=GRAVITY, height=RADIUS, slope=0.0, **material) -> Model:
 
 
 def hertz() -> float:
-    """The force is this times the depth to the power 3/2, N."""
+    """Return the factor K (N/m^(3/2)) of Hertz's law: force = K depth^(3/2)."""
     k = 0.5 * STIFFNESS ** (2.0 / 3.0)
     return 4.0 / 3.0 * k * (RADIUS * k) ** 0.5
 
@@ -60,7 +60,7 @@ def engine(request):
 
 @pytest.mark.parametrize("dissipation", [0.0, 0.2, 1.0])
 def test_bounce(engine, dissipation):
-    """Without gravity, m v dv = -K d^(3/2) (1 + a v) dd with a = 3/2 c: the speeds in and out have one integral.
+    """Without gravity, m v dv = -K d^(3/2) (1 + a v) dd with a = 3/2 c: speeds before and after have one integral.
 
     K. H. Hunt and F. R. E. Crossley (1975): e = 1 - c v for slow impacts.
     """
@@ -76,7 +76,7 @@ def test_bounce(engine, dissipation):
     a = 1.5 * dissipation
 
     def energy(v: float) -> float:
-        """Integral of v / (1 + a v)."""
+        """Return the integral of v / (1 + a v)."""
         return 0.5 * v * v if a == 0.0 else v / a - log1p(a * v) / a**2
 
     low, high = 0.0, speed if a == 0.0 else min(speed, 1.0 / a)
@@ -88,19 +88,19 @@ def test_bounce(engine, dissipation):
     deepest = RADIUS - trajectory.values[:, trajectory.coordinates.index("height")].min()
     assert deepest == pytest.approx((2.5 * MASS / hertz() * energy(speed)) ** 0.4, rel=1e-4)
     if a == 0.0:
-        # H. Hertz (1881): 2.9432 times the deepest overlap over the speed.
+        # H. Hertz (1881): contact lasts 2.9432 times the deepest penetration over the speed.
         assert end - begin == pytest.approx(2.94328 * deepest / speed, rel=1e-4)
     else:
         assert 0.5 * (1.0 - dissipation * speed) < expected / speed < 1.0
 
 
 def rest(slope=0.0):
-    """Height at which the ball rests, m."""
+    """Return the height at which the ball rests (m)."""
     return RADIUS - (MASS * GRAVITY * np.cos(slope) / hertz()) ** (2.0 / 3.0)
 
 
 def test_sliding(engine):
-    """us = ud = u: friction is u m g down to the transition velocity, and goes with the velocity below it."""
+    """With us = ud = u, friction is u m g above the transition velocity, and proportional to the velocity below it."""
     u, speed, vt = 0.4, 1.5, 0.05
     model = on_floor(height=rest(), dissipation=1.0, static_friction=u, dynamic_friction=u)
     to = 0.6
@@ -115,7 +115,7 @@ def test_sliding(engine):
 
 
 def test_sticking_on_a_slope(engine):
-    """Friction of this kind does not hold: the ball creeps by the fraction of the transition velocity that it needs."""
+    """Such friction does not hold: the ball creeps at the speed whose friction equals the weight along the slope."""
     u, slope, vt = 0.6, radians(20.0), 0.05
     model = on_floor(
         height=rest(slope), slope=slope, dissipation=1.0, static_friction=u, dynamic_friction=u
@@ -127,7 +127,7 @@ def test_sticking_on_a_slope(engine):
 
 
 def test_sliding_down_a_slope(engine):
-    """Steeper than friction can hold, and with viscous friction, it reaches a speed that grows no more."""
+    """On a slope too steep for friction, viscous friction leads to a constant speed."""
     ud, uv, slope = 0.2, 0.5, radians(25.0)
     material = {"static_friction": ud, "dynamic_friction": ud, "viscous_friction": uv}
     model = on_floor(height=rest(slope), slope=slope, dissipation=1.0, **material)
@@ -135,7 +135,7 @@ def test_sliding_down_a_slope(engine):
         trajectory = simulation.run(8.0, accuracy=1e-9)
     along = trajectory.coordinates.index("along")
     assert trajectory.speeds[-1][along] == pytest.approx((tan(slope) - ud) / uv, rel=1e-6)
-    # On the way there: v' = g (sin - cos (ud + uv v)), from the transition velocity on.
+    # On the way there, v' = g (sin - cos (ud + uv v)) above the transition velocity.
     rate, most = GRAVITY * np.cos(slope) * uv, (tan(slope) - ud) / uv
     first, second = 50, 150
     v, w = trajectory.speeds[first][along], trajectory.speeds[second][along]

@@ -1,4 +1,4 @@
-"""Several contacts in one force, through the PyBullet engine."""
+"""Tests of several contacts in one force with the PyBullet engine, with and without Simbody's early return."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from osimlite.simulation.engines.bullet.engine import BulletEngine
 
 
 def sled(positions, *, early_return):
-    """Two balls on sliders above a floor, all in one force."""
+    """Return mechanism and forces of two balls on sliders above a floor, with a single contact force."""
     model = Model(name="sled")
     floor = ContactHalfSpace(
         name="floor", socket_frame=model.ground, orientation=(0.0, 0.0, -math.pi / 2)
@@ -78,7 +78,7 @@ def test_simbodys_early_return_behind_its_switch(positions, speeds, early_return
 
 
 def test_spheres_of_one_force_push_each_other():
-    """Equal and opposite along the line of their centres, as deep as they overlap."""
+    """The forces are equal and opposite along the line of the centres, and follow from the overlap."""
     mechanism, forces = sled((0.0, 0.06), early_return=False)
     (element,) = forces.elements
     assert len(element.pairs) == 3

@@ -1,4 +1,4 @@
-"""Least effort with equations and bounds, held to other programs on random problems."""
+"""Tests of minimal effort with equations and bounds, against other programs on random problems."""
 
 from __future__ import annotations
 
@@ -25,7 +25,19 @@ def solved(
     power: float = 2.0,
     code: Code | None = None,
 ) -> tuple[Array, Array, Array]:
-    """Unknowns, what is missing, and whether nothing is; for columns (t, n, m)."""
+    """Run the kernel `least_effort`.
+
+    Args:
+        columns: transposed equation matrices (t, n, m).
+        wanted: right-hand sides (t, m).
+        low: lower bounds (n,).
+        high: upper bounds (n,).
+        power: exponent of the effort.
+        code: source of the kernel; by default the best one.
+
+    Returns:
+        Unknowns (t, n), residuals (t, m), and 1 for each solved frame (t,).
+    """
     frames, n, m = columns.shape
     sizes = np.array([frames, m, n, *[0] * (n * (m + 1))], dtype=np.int64)
     given = np.hstack([columns.reshape(frames, -1), wanted])
@@ -40,7 +52,18 @@ def solved(
 def problem(
     random: Generator, m: int, n: int, frames: int = 1
 ) -> tuple[Array, Array, Array, Array]:
-    """Columns, right sides that some unknowns give, and bounds of which some are infinite."""
+    """Return a random problem that has a solution.
+
+    Args:
+        random: source of random numbers.
+        m: number of equations.
+        n: number of unknowns.
+        frames: number of frames.
+
+    Returns:
+        Transposed matrices (frames, n, m), right-hand sides (frames, m), and lower and upper bounds (n,), some
+        of them infinite.
+    """
     columns = random.normal(size=(frames, n, m)) * (random.random((frames, n, m)) < 0.6)
     low, high = -random.random(n), random.random(n)
     low[::4], high[::4] = -np.inf, np.inf
@@ -51,7 +74,7 @@ def problem(
 
 
 def test_frames_in_several_calls_give_what_one_call_gives() -> None:
-    """Frames start from the previous one, also where a call of the kernel ended between them."""
+    """Each frame starts from the solution of the previous one, even if a call of the kernel ended in between."""
     columns, wanted, low, high = problem(default_rng(5), 4, 9, frames=40)
     wanted[11] *= 100.0
     for power in (2.0, 3.0):
@@ -64,13 +87,13 @@ def test_frames_in_several_calls_give_what_one_call_gives() -> None:
 
 
 def test_weak_ones_give_what_full_ones_leave() -> None:
-    """Reserves of 1 N m beside muscles that can change their force by little: a window of CMC in a public walk."""
+    """The problem has reserves of 1 N m and muscles with little freedom, from a window of CMC in a public walk."""
     with np.load(Path(__file__).with_name("full_muscles.npz")) as given:
         columns, wanted, (low, high) = given["columns"], given["wanted"], given["bounds"]
     (x,), _, (is_solved,) = solved(columns[None], wanted[None], low, high)
     assert is_solved
     assert np.max(np.abs(x @ columns - wanted) / (np.abs(x) @ np.abs(columns))) < 1e-10
-    # found in a prototype by another search
+    # The value comes from a prototype with another algorithm.
     assert x @ x == pytest.approx(648.4029065353637, rel=1e-9)
 
 
@@ -86,8 +109,7 @@ def test_the_quadratic_problem() -> None:
         assert missing == pytest.approx(0.0, abs=1e-11)
         assert (low <= x).all()
         assert (x <= high).all()
-        # At the least one, x plus what the multipliers of bounds push is in the range of the
-        # equations.
+        # At the minimum, free unknowns follow from multipliers of the equations; at bounds these point outwards.
         free = (low < x) & (x < high)
         push, *_ = np.linalg.lstsq(columns[0][free], x[free], rcond=None)
         pulled = columns[0] @ push
@@ -106,7 +128,7 @@ def test_the_quadratic_problem() -> None:
 def by_others(
     columns: Array, wanted: Array, low: Array, high: Array, power: float, start: Array
 ) -> float:
-    """The least sum that SciPy finds."""
+    """Return the minimum that SciPy's SLSQP finds, or infinity if it fails."""
     result = optimize.minimize(
         lambda x: np.sum(np.abs(x) ** power),
         start,

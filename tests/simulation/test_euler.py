@@ -1,4 +1,4 @@
-"""Semi-implicit Euler on equations whose solution is known, and where it must refuse."""
+"""Tests of semi-implicit Euler on equations with known solutions, and of its errors."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def test_euler_is_of_first_order():
 
 
 def test_euler_keeps_the_energy_of_an_oscillator():
-    """The semi-implicit method is symplectic: no drift in a hundred swings."""
+    """The method is symplectic: the energy does not drift in a hundred periods."""
     for _, (q, u) in SemiImplicitEuler(oscillator, 0.0, [1.0, 0.0], 1, 0.05).iterate_steps(
         200 * math.pi
     ):
@@ -38,7 +38,7 @@ def test_euler_keeps_the_energy_of_an_oscillator():
 
 
 def test_euler_with_rates_of_its_own():
-    """Coordinates that are not the integrals of the speeds; the new speeds are used with the old coordinates."""
+    """Coordinates are not integrals of the speeds here; the rates use the old coordinates and the new speeds."""
 
     def f(t, y):
         return [0.0, 1.0]

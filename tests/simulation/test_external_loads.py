@@ -1,4 +1,4 @@
-"""Measured forces: what they do in a simulation, and what is refused."""
+"""Tests of measured forces: their effect in a simulation, and refused documents."""
 
 from __future__ import annotations
 
@@ -140,7 +140,7 @@ def test_a_measured_force_without_data_is_refused(model):
 
 
 def test_what_older_versions_asked_for_is_ignored_and_what_is_misspelt_refused(model, tmp_path):
-    """As the public files of Rajagopal2016 have it."""
+    """The public files of Rajagopal2016 contain the old properties."""
     data(tmp_path, np.ones((2, 9)))
     path = document(tmp_path, force(), version=30000)
     old = "<external_loads_model_kinematics_file>ik.mot</external_loads_model_kinematics_file>"

@@ -1,4 +1,4 @@
-"""Numbers that no model has: every engine gives the same verdict, a motion or one plain error."""
+"""Tests of extreme numbers in models: every engine gives the same verdict, a motion or a clear error."""
 
 from __future__ import annotations
 
@@ -117,8 +117,7 @@ def test_any_number_gets_one_verdict(data):
     text = to_text(with_force(FORCES[name]))
     leaf = data.draw(st.sampled_from(list(NUMBERS.finditer(text))))
     words, extreme = leaf[2].split(), data.draw(st.sampled_from(EXTREMES))
-    # Next to the inertia about a joint at 1e16 m, that of the body is rounding, and so is whether
-    # the sum is positive.
+    # With a mass centre at 1e16 m, the body's own inertia is a rounding error, and so is the sign of the sum.
     assume(not (extreme == "1e16" and leaf[0].startswith("<mass_center>")))
     places = data.draw(
         st.sampled_from([[place] for place in range(len(words))] + [list(range(len(words)))])
@@ -146,7 +145,7 @@ def test_a_station_that_is_nowhere_is_no_matter():
 
 
 def test_steps_that_lead_nowhere_come_to_an_end():
-    """Each is as short as the number range allows, and there would be no end of them."""
+    """Each step is as short as the range of numbers permits, so without a limit their number would be endless."""
     model = pendulum(osimlite.PinJoint)
     coordinate = next(iter(model.components(osimlite.Coordinate)))
     words = "1e40*sin(1e30*q)"

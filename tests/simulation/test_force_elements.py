@@ -1,4 +1,4 @@
-"""Force elements without OpenSim: what is refused by name, what conserves energy, what depends on time."""
+"""Tests of force elements without OpenSim: refused forces, conservation of energy, dependence on time."""
 
 from __future__ import annotations
 
@@ -241,7 +241,7 @@ def test_springs_conserve_energy(force):
 
 @pytest.mark.parametrize("how", [{"accuracy": 1e-10}, {"fixed_step": 1e-5}])
 def test_a_control_follows_the_time(how):
-    """A mass pushed by A sin(w t) alone moves as A/(m w) (t - sin(w t)/w)."""
+    """A mass that A sin(w t) pushes moves as A/(m w) (t - sin(w t)/w)."""
     model = Model(name="push", gravity=(0, 0, 0))
     body = model.add(Body(name="mass", mass=2.0, inertia=(1, 1, 1, 0, 0, 0)))
     model.add(
@@ -260,7 +260,7 @@ def test_a_control_follows_the_time(how):
 
 
 def egg_over_floor(*more) -> Model:
-    """An ellipsoid that falls on its longer side, and whatever else touches by the same force."""
+    """Return an ellipsoid that falls on its longer side; `more` surfaces are added to its contact force."""
     model = Model(name="egg")
     body = model.add(Body(name="egg", mass=1.0, inertia=(0.02, 0.01, 0.02, 0, 0, 0)))
     model.add(SliderJoint(name="fall", coordinates=[Coordinate(name="height", default_value=0.3)]).between(

@@ -1,4 +1,4 @@
-"""What is said of paths of functions that make no sense."""
+"""Tests of errors about function-based paths that make no sense."""
 
 from __future__ import annotations
 

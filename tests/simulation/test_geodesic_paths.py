@@ -1,4 +1,4 @@
-"""Paths that bend around surfaces along geodesics: answers that are known, and derivatives of the length."""
+"""Tests of paths along geodesics of surfaces: known lengths, and derivatives of the length."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def length(paths, first, second):
 
 
 def over_circle(first, second, radius):
-    """Length of the shorter way in a plane around a circle about the origin."""
+    """Return the length of the shorter path around a circle about the origin, in its plane."""
     d1, d2 = hypot(*first), hypot(*second)
     angle = acos(np.dot(first, second) / d1 / d2) - acos(radius / d1) - acos(radius / d2)
     return sqrt(d1**2 - radius**2) + sqrt(d2**2 - radius**2) + radius * angle
@@ -59,14 +59,14 @@ def test_great_circle_on_a_sphere():
 
 
 def test_meridian_of_a_torus():
-    """In a plane through the axis the path bends around the tube as around a circle."""
+    """In a plane through the axis of the torus, the path wraps around the tube as around a circle."""
     paths = around(surface("Torus", [0.02, 0.1]))
     inner = over_circle((-0.01, -0.1), (-0.01, 0.12), 0.02)
     assert length(paths, (0.09, 0.0, -0.1), (0.09, 0.0, 0.12)) == pytest.approx(inner, rel=1e-12)
 
 
 def test_ellipse_of_an_ellipsoid():
-    """In a plane of symmetry the path is the tangents of an ellipse and its arc."""
+    """In a plane of symmetry, the path consists of tangents of an ellipse and its arc."""
     a, b = 0.05, 0.03
     paths = around(surface("Ellipsoid", [a, b, 0.06]))
     # From (-d, 0) the tangent touches where cos t = -a / d.
@@ -79,7 +79,7 @@ def test_ellipse_of_an_ellipsoid():
 
 
 def test_ellipsoid_against_another_integrator():
-    """Lines through two points that are tangent to one geodesic."""
+    """The lines from both ends must be tangent to one geodesic, which SciPy integrates."""
     weights = np.array((0.03, 0.05, 0.04)) ** -2
     first, second = np.array((-0.08, 0.01, 0.03)), np.array((0.09, 0.01, -0.02))
 
@@ -102,7 +102,7 @@ def test_ellipsoid_against_another_integrator():
 
 
 def derivative(of, h=2e-3):
-    """By differences, extrapolated."""
+    """Return the derivative of a function at 0 by extrapolated central differences."""
     one, two, four = ((of(h / k) - of(-h / k)) * k / (2 * h) for k in (1, 2, 4))
     one, two = (4 * two - one) / 3, (4 * four - two) / 3
     return (16 * two - one) / 15
@@ -151,7 +151,7 @@ ALL = {"Cylinder": [0.03, 9.0], "Sphere": [0.04], "Ellipsoid": [0.03, 0.05, 0.04
     ids=" and ".join,
 )
 def test_lengths_around_two_surfaces_do_not_jump(kinds):
-    """On either side of both, and between them: where another way gets shorter its length is that of the one before."""
+    """On both sides of the surfaces and between them, where the shortest path changes, both paths have equal length."""
     one, two = (surface(kind, ALL[kind]) for kind in kinds)
     paths = around(
         one, {**two, "translation": (0.09, 0.01, 0.02), "xyz_body_rotation": (0.4, -0.3, 0.2)}
@@ -167,7 +167,7 @@ def test_lengths_around_two_surfaces_do_not_jump(kinds):
 
 
 def test_surfaces_that_intersect():
-    """In the notch between them the path bends around the one with a side alone, and does not go straight on."""
+    """In the notch between the surfaces, the path wraps around the one with an active side."""
     held, other = (
         surface("Sphere", [0.04], "y"),
         {**surface("Sphere", [0.03]), "translation": (0.04, 0.03, 0.0)},
@@ -198,7 +198,7 @@ def test_nothing_outside_of_a_path_is_touched(monkeypatch):
     ids=["cylinder", "cylinder y", "sphere y", "ellipsoid"],
 )
 def test_a_surface_is_met_and_left_at_tangency(one):
-    """The path gets longer than a line by no more than the cube of the depth to 1/2, and is never shorter."""
+    """The path is never shorter than the line, and longer by at most the order of the depth to the power 3/2."""
     paths = around(one)
     for depth in (-1e-6, -1e-12, 0.0, 1e-12, 1e-8, 1e-6):
         line = hypot(0.2, 0.02)
@@ -207,7 +207,7 @@ def test_a_surface_is_met_and_left_at_tangency(one):
 
 
 def test_sides():
-    """A path stays on the active side of a cylinder, even if the straight line misses that on the other one."""
+    """A path stays on the active side of a cylinder, even if the straight line passes on the other side."""
     first, second = (-0.1, -0.05, 0.0), (0.1, -0.05, 0.02)
     flat = 2 * sqrt(0.1**2 + 0.05**2 - 0.03**2)
     angle = 2 * (pi - acos(0.05 / hypot(0.1, 0.05)) - acos(0.03 / hypot(0.1, 0.05)))
@@ -224,7 +224,7 @@ def test_sides():
 
 @pytest.mark.parametrize("mirrored", [1.0, -1.0])
 def test_a_knee_winds_on(mirrored):
-    """Across a cylinder the ways are the same, also where an end has turned past the half plane behind it."""
+    """Around a cylinder both methods agree, even if an end has turned past the half plane behind it."""
     knee = wrapped({"via": (), "objects": (surface("Cylinder", [0.04, 1.0], "x"),)})
     paths, usual = osimlite.paths(knee, wrapping="geodesic"), osimlite.paths(knee)
     for flexion in np.linspace(0.0, 2.6, 27):
@@ -253,7 +253,7 @@ def test_only_the_piece_nearest_to_the_axis_is_held_on_a_side():
 
 
 def test_far_side_of_a_sphere():
-    """Where OpenSim's length is negative."""
+    """OpenSim's length is negative here."""
     result = length(
         around(surface("Sphere", [0.04], "x")), (-0.039, 0.02, 0.0), (-0.039, -0.02, 0.001)
     )
@@ -266,7 +266,7 @@ def test_unknown_wrapping():
 
 
 def test_a_simulation_runs_along_geodesics():
-    """Its first acceleration is that of the moment arms."""
+    """The first acceleration follows from the moment arms."""
     model = wrapped({"via": (), "objects": (surface("Cylinder", [0.03, 1.0]),)})
     paths, ends = (
         osimlite.paths(model, wrapping="geodesic"),

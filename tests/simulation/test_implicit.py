@@ -1,4 +1,4 @@
-"""Integrators for stiff motion: their linear equations, order, error, constraints, contacts, and what they cost."""
+"""Tests of integrators for stiff motions: linear equations, order, errors, constraints, contacts and cost."""
 
 from __future__ import annotations
 
@@ -47,14 +47,31 @@ METHODS = "adams", "bdf", "rosenbrock"
 def steps_of(
     f: Any, y: list[float], accuracy: float, method: str, to: float = 3.0
 ) -> tuple[list[float], Any]:
-    """The end of a motion of auxiliary states only, and its stepper."""
+    """Integrate auxiliary states only.
+
+    Args:
+        f: derivative function of (t, y).
+        y: initial state.
+        accuracy: accuracy of the integrator.
+        method: the integrator.
+        to: end time.
+
+    Returns:
+        Final state, and the stepper.
+    """
     options = IntegrationOptions(accuracy=accuracy, integrator=method)
     stepper = ControlledSteps(Equations(f, len(y), 0), 0.0, y, options)  # type: ignore[arg-type]
     return last(stepper.iterate_steps(to))[1], stepper
 
 
 def hanging(case: str, excitation: float = 0.5, gravity: float = 9.80665) -> Any:
-    """A block that hangs on a muscle, off its equilibrium."""
+    """Return a model of a block that hangs on a muscle away from its equilibrium.
+
+    Args:
+        case: the muscle, a name in CONFIGURATIONS.
+        excitation: constant excitation.
+        gravity: gravity (m/s²).
+    """
     force = muscle(case)
     force.default_activation = 0.6 * excitation
     model = hung(force, (excitation, excitation), gravity)
@@ -67,7 +84,7 @@ def hanging(case: str, excitation: float = 0.5, gravity: float = 9.80665) -> Any
     "case", ["thelen_default", "millard_damped", "millard_rigid", "dgf_default"]
 )
 def test_condensed_equations_are_those_of_all_states(case):
-    """On a slider nothing but the muscle has derivatives: J is that of the engine."""
+    """On a slider only the muscle has derivatives, so J equals that of the engine."""
     model = hanging(case)
     with Simulation(model, "compiled") as simulation:
         y = np.array(simulation.initial_state({}, {"x": 0.1}, equilibrate=True))
@@ -75,7 +92,12 @@ def test_condensed_equations_are_those_of_all_states(case):
 
 
 def rolling(is_smooth: bool = False, **material: float) -> Any:
-    """A body off the centre of which a ball rolls and slips over a floor."""
+    """Return a body with an eccentric ball that rolls and slips over a floor.
+
+    Args:
+        is_smooth: use the smooth contact law.
+        material: properties of the contact.
+    """
     model = Model(name="rolling")
     body = model.add(Body(name="body", mass=2.0, inertia=(0.01, 0.01, 0.01, 0, 0, 0)))
     joint = PlanarJoint(name="plane")
@@ -104,17 +126,23 @@ def rolling(is_smooth: bool = False, **material: float) -> Any:
 
 @pytest.mark.parametrize("is_smooth", [False, True])
 def test_equations_of_a_contact_are_those_of_all_coordinates(is_smooth):
-    """Friction in proportion to slip, without damping: but for how the depth moves the point, nothing is left out."""
+    """Friction is proportional to slip; the equations neglect only how penetration moves the contact point."""
     material = {"dissipation": 0.0} if is_smooth else {}
     model = rolling(is_smooth, static_friction=0.8, dynamic_friction=0.8, **material)
-    # How coordinates turn the lever of a smooth contact is left out, too.
+    # For smooth contact they also neglect how coordinates rotate the lever arm.
     assert_condensed(
         model, np.array([0.3, 0.0, 0.095, 3.0, -0.2, -0.9]), rel=0.02 if is_smooth else 0.01
     )
 
 
 def assert_condensed(model, y, rel=1e-4):
-    """The linear equations are those of the engine's own derivatives."""
+    """Compare solutions of the condensed linear equations with those by finite differences of the state derivative.
+
+    Args:
+        model: the model.
+        y: state.
+        rel: relative tolerance.
+    """
     mechanism = build_mechanism(model)
     system = System(mechanism, force_elements(model, mechanism), code=PYTHON_CODE)
     s = system.structure
@@ -146,9 +174,9 @@ def rates_at(system: System, y: Any) -> Any:
 # ------------------------------------------------------------------------------------------------------------- order
 @pytest.mark.parametrize(("method", "order"), [("adams", 7), ("bdf", 5), ("rosenbrock", 2)])
 def test_steps_grow_with_the_accuracy_as_the_order_says(method, order):
-    """The estimated error goes with h^(k + 1) in a formula of order k, with h^k in the embedded one of order k - 1.
+    """The estimated error is of order h^(k + 1) in a formula of order k, and h^k in the embedded one of order k - 1.
 
-    These equations have no J, so that Rosenbrock's method has the order that it has whatever J is.
+    These equations do not use J, so that Rosenbrock's method has the order that it has for any J.
     """
     power = order if method == "rosenbrock" else order + 1
     # Rosenbrock's method takes 30 times as many steps at 1e-8 as at 1e-5.
@@ -162,7 +190,7 @@ def test_steps_grow_with_the_accuracy_as_the_order_says(method, order):
 
 
 def test_rosenbrock_has_order_3():
-    """And 2 whatever J is; the end of a step in which something decays at once is where it decays to."""
+    """The order is 3, and 2 for any J; a stiffly decaying component reaches its limit at the end of a step."""
     alpha, weights, embedded = (np.array(part) for part in (ALPHA, WEIGHTS, EMBEDDED))
     beta, ones = alpha + np.array(GAMMA), np.ones(4)
     c = alpha @ ones
@@ -184,7 +212,7 @@ def test_error_follows_the_accuracy(method, accuracy):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_a_jump_is_passed(method):
-    """What changes abruptly makes the steps short there, and only there."""
+    """Steps are short at the discontinuity, and only there."""
     y, stepper = steps_of(lambda t, y: [0.0 if t < 1.0 else 10.0], [0.0], 1e-6, method, to=2.0)
     assert y[0] == pytest.approx(10.0, abs=1e-4)
     assert stepper.attempted < 300
@@ -211,7 +239,7 @@ def test_a_block_hangs_on_a_muscle(case, method):
         result.summary["integrator"]
         == {"adams": "Adams", "bdf": "BDF", "rosenbrock": "Rosenbrock"}[method]
     )
-    # At every report: the interpolated motion too.
+    # Compare at every report, and thereby the interpolation.
     assert np.abs(result.values - exact.values).max() < 2e-5
     for path, values in exact.auxiliary.items():
         assert np.abs(result.auxiliary[path] - values).max() < 2e-5, path
@@ -221,7 +249,7 @@ def test_a_block_hangs_on_a_muscle(case, method):
     ("number", "method"), [("m0001", "bdf"), ("m0001", "rosenbrock"), ("m0005", "adams")]
 )
 def test_real_models_move(number, method, corpus):
-    """An arm and a gait model."""
+    """The models are an arm and a gait model."""
     (path,) = (model.path for model in corpus if model.id == number)
     with Simulation(osimlite.read(path), "compiled", equilibrate=True) as simulation:
         exact = simulation.run(0.05, accuracy=1e-8)
@@ -292,8 +320,7 @@ def test_an_unknown_integrator_is_refused(walker):
 @pytest.mark.parametrize(("method", "accuracy"), [("adams", 1e-3), ("bdf", 1e-2)])
 def test_derivatives_that_became_too_large_end_no_iteration(method, accuracy):
     model = hung(muscle("thelen_default"))
-    # The fiber pulls with e^40 of its force, and with less after each step: by as much derivatives
-    # become too large.
+    # The fiber pulls with e^40 times its force, and with less after each step, so that old derivatives are too large.
     model.find("/forceset/mu").default_fiber_length = 0.16
     with Simulation(model, "compiled") as simulation:
         result, exact = (

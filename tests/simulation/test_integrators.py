@@ -1,4 +1,4 @@
-"""Runge-Kutta-Merson on equations whose solution is known, and where it must refuse."""
+"""Tests of Runge-Kutta-Merson on equations with known solutions, and of its errors."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from tests.simulation.equations import (
 
 
 def fixed_steps(f, y, until, n):
-    """The state after n steps of equal length, which nothing but their ends decides."""
+    """Return the state after n steps of equal length, which the error control does not change."""
     integrator = runge_kutta_merson(f, 0.0, y, len(y) // 2, accuracy=0.9)
     for i in range(n):
         integrator.next_step = until / n
@@ -49,7 +49,7 @@ def test_fourth_order(f):
     st.floats(-1.0, 1.0),
 )
 def test_exact_for_cubic_derivatives(coefficients, h, t0):
-    """Quadrature of order four, at the solution's weights and at the nodes of the method."""
+    """The quadrature is exact for cubic derivatives, at the solution's weights and the nodes of the method."""
     a, b, c, d = coefficients
 
     def antiderivative(t):
@@ -74,8 +74,7 @@ def test_error_follows_the_accuracy(accuracy):
     t, y = last(integrator.iterate_steps(10.0))
     assert t == 10.0
     error = max(abs(y[0] - math.cos(10.0)), abs(y[1] + math.sin(10.0)))
-    # No step may err by more than the accuracy; an oscillator does not amplify what was erred
-    # before.
+    # Each step errs by at most the accuracy; an oscillator does not amplify earlier errors.
     assert error < 2.0 * accuracy * integrator.accepted
     assert error > 1e-3 * accuracy
 
@@ -94,9 +93,9 @@ def test_more_accuracy_costs_more_and_gains():
 def test_default_accuracy_and_first_step_are_opensims():
     first = runge_kutta_merson(lambda t, y: [y[1], 0.0], 0.0, [0.0, 0.0], 1)
     first.step()
-    assert first.time == 0.01  # no error at all: taken as it is ...
+    assert first.time == 0.01  # without an error: accepted ...
     first.step()
-    assert first.time == pytest.approx(0.06)  # ... and followed by one five times as large
+    assert first.time == pytest.approx(0.06)  # ... and the next step is five times as large
     by_default = list(runge_kutta_merson(pendulum, 0.0, [1.0, 0.0], 1).iterate_steps(2.0))
     assert by_default == list(
         runge_kutta_merson(pendulum, 0.0, [1.0, 0.0], 1, accuracy=1e-3).iterate_steps(2.0)
@@ -114,7 +113,7 @@ def test_speeds_count_relative_to_their_size_and_coordinates_do_not():
 
     assert count([0.0, 1e3], 1) == count([0.0, 1e6], 1)
     assert count([1e6, 0.0], 1) > 1.5 * count([1e3, 0.0], 1)
-    # Below 1, speeds count as they are.
+    # Below 1, errors of speeds count absolutely.
     assert (
         count([0.0, 1e-9], 1) < count([0.0, 1e-3], 1) < count([0.0, 1.0], 1) == count([0.0, 1e3], 1)
     )
@@ -123,7 +122,7 @@ def test_speeds_count_relative_to_their_size_and_coordinates_do_not():
 
 
 def test_coordinates_left_out_may_be_counted():
-    """A locked coordinate in the state, or out of it but counted: the same steps."""
+    """A locked coordinate counts in the error norm, whether it is a state or only counted."""
 
     def locked(t, y):
         return [0.0, y[3], 0.0, -9.81 * math.sin(y[1])]
@@ -139,7 +138,7 @@ def test_coordinates_left_out_may_be_counted():
 
 
 def test_the_worst_of_coordinates_speeds_and_auxiliary_states_decides():
-    """Three states that do not know of each other: steps are as small as the most demanding one needs."""
+    """The three states are independent: the most demanding one determines the steps."""
 
     def apart(t, y):
         return [math.cos(3 * t), math.cos(20 * t), math.cos(7 * t)]
@@ -162,7 +161,7 @@ def test_next_step(h, error, accuracy, cut):
     if new < h:
         assert new <= 0.9 * h
     if h < new < 5.0 * h or 0.1 * h < new < 0.9 * h:
-        # The error to be expected of the new step is 0.9^4 of the accuracy.
+        # The expected error of the new step is 0.9^4 of the accuracy.
         assert error * (new / h) ** 4 == pytest.approx(0.9**4 * accuracy, rel=1e-6)
 
 
@@ -180,7 +179,7 @@ def test_next_step(h, error, accuracy, cut):
     ],
 )
 def test_next_step_where_a_given_one_is_wanted(wanted, chosen):
-    """Factors of the present step; just below 0.9 the error exceeds the accuracy."""
+    """Arguments are factors of the current step; just below 0.9 the error exceeds the accuracy."""
     assert next_step_size(1.0, 1e-3 * (0.9 / wanted) ** 4, 1e-3, False, 4.0) == pytest.approx(
         chosen
     )
@@ -198,7 +197,7 @@ def test_counts():
     assert len(steps) == integrator.accepted
     assert integrator.attempted > integrator.accepted
     assert integrator.evaluations == 1 + 4 * integrator.attempted + integrator.accepted
-    # A step that is taken by itself looks at its start once more.
+    # A single step evaluates its start once more.
     assert f.calls == integrator.evaluations + integrator.accepted
     together = Counting(pendulum)
     runge_kutta_merson(together, 0.0, [3.0, 0.0], 1).tabulate([10.0])
@@ -222,7 +221,7 @@ def test_a_derivative_that_is_no_number_at_the_start():
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 def test_a_derivative_that_ceases_to_exist(bad):
-    """The integrator creeps up to the place and names it."""
+    """The integrator approaches the time of the discontinuity and reports it."""
 
     def f(t, y):
         return [y[1], 0.0, bad if t > 0.7 else 1.0]
@@ -236,7 +235,7 @@ def test_a_derivative_that_ceases_to_exist(bad):
 
 
 def test_no_number_in_a_trial_step_only():
-    """A first step into forbidden ground is made smaller, as Simbody would."""
+    """A first step into undefined states is shortened, as Simbody does."""
 
     def f(t, y):
         return [math.nan if y[0] > 1.1 else -400.0 * (y[0] - 1.0)]
@@ -291,7 +290,7 @@ def test_failing_at_the_first_state():
 
 
 def test_no_step_small_enough():
-    """y' = y^2 leaves every bound at t = 1."""
+    """The solution of y' = y^2 is unbounded at t = 1."""
     integrator = runge_kutta_merson(
         lambda t, y: [0.0, y[1] * y[1]], 0.0, [0.0, 1.0], 1, names=["q", "speed of q"]
     )

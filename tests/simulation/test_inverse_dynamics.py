@@ -1,4 +1,4 @@
-"""Kinematics and inverse dynamics in one call: motions and measured loads in every form."""
+"""Tests of `kinematics` and `inverse_dynamics`: motions and measured loads in all forms."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ TIMES = np.linspace(0.0, 1.0, 51)
 
 
 def box(mass: float = 2.0) -> osimlite.Model:
-    """A body that moves along three axes, with a marker."""
+    """Return a free body with three markers."""
     model = osimlite.Model(name="box")
     body = model.add(osimlite.Body(name="box", mass=mass, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
     joint = osimlite.FreeJoint(name="j", socket_parent_frame=model.ground, socket_child_frame=body)
@@ -32,7 +32,7 @@ def box(mass: float = 2.0) -> osimlite.Model:
 
 
 def test_motions_in_every_form_are_the_same(tmp_path: Path) -> None:
-    """A file, arrays, a fitted motion, and one that is read already."""
+    """A motion may be a file, arrays, a fitted motion, or a motion that has been read already."""
     model, up = box(), 0.5 * TIMES**2
     write_sto(tmp_path / "up.mot", "up", TIMES, ("y",), up[:, None].tolist())
     table = osimlite.inverse_dynamics(model, tmp_path / "up.mot")
@@ -66,7 +66,7 @@ def test_motions_in_every_form_are_the_same(tmp_path: Path) -> None:
 
 
 def test_results_are_tables_of_other_libraries() -> None:
-    """Of pandas and xarray; labels that are there twice are kept apart."""
+    """Results convert to pandas and xarray; duplicate labels remain separate."""
     model = box()
     table = osimlite.inverse_dynamics(model, {"y": TIMES}, times=TIMES)
     frame, data = table.to_frame(), table.to_xarray()
@@ -75,7 +75,7 @@ def test_results_are_tables_of_other_libraries() -> None:
         "y_force"
     ][-1]
     assert table.motion is not None and table.motion.values[:, 4].tolist() == TIMES.tolist()
-    # A free joint: three angles and three positions.
+    # A free joint has three angles and three positions.
     assert {table.units[name] for name in table.columns if name.endswith("_moment")} == {"N·m"}
     assert table.units["y_force"] == frame.attrs["units"]["y_force"] == "N"
     followed: Any = osimlite.kinematics(model, {"y": TIMES}, times=TIMES)
@@ -87,7 +87,7 @@ def test_results_are_tables_of_other_libraries() -> None:
 
 
 def test_only_a_part_of_the_motion() -> None:
-    """The derivatives are those of the whole."""
+    """Derivatives within a part are those of the complete motion."""
     model, up = box(), np.sin(TIMES)
     whole = osimlite.inverse_dynamics(model, {"y": up}, times=TIMES)
     part = osimlite.inverse_dynamics(model, {"y": up}, times=TIMES, start=0.2, end=0.5)
@@ -101,7 +101,7 @@ def test_only_a_part_of_the_motion() -> None:
 
 
 def test_loads_without_a_document(tmp_path: Path) -> None:
-    """The columns of a .mot or .c3d file, said in the call, do what a document of ExternalLoads does."""
+    """Arguments that name columns of a .mot or .c3d file have the effect of an ExternalLoads document."""
     pytest.importorskip("ezc3d")
     model, plate = box(), TRIALS / "force_plate.c3d"
     measured = read_c3d_forces(plate)
@@ -149,7 +149,7 @@ def test_loads_without_a_document(tmp_path: Path) -> None:
 
 
 def test_the_model_stays_as_it_is() -> None:
-    """What does not push is left out of a copy."""
+    """Excluded forces are left out of a copy of the model."""
     model = box()
     spring = model.add(osimlite.SpringGeneralizedForce(name="s", coordinate="y", stiffness=100.0))
     up = {"y": 1.0 + 0.0 * TIMES}

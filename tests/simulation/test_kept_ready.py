@@ -1,4 +1,4 @@
-"""What stays ready between two simulations of a model is that of the model as it is."""
+"""Tests of simulations that are cached between calls: changes of the model are noticed."""
 
 from __future__ import annotations
 
@@ -133,7 +133,7 @@ def test_a_trajectory_has_the_model_as_it_was(repo):
 
 
 def test_files_are_read_every_time(repo, tmp_path):
-    """A table of controls beside a model may change without a word."""
+    """A table of controls may change although the model does not."""
     model = osimlite.read(repo / WALKER)
     coordinate = list(model.components(osimlite.Coordinate))[-1]
     model.add(
@@ -178,8 +178,7 @@ def test_a_model_that_has_moved_moves_in_one_call(repo, monkeypatch):
     osimlite.simulate(model, to=1.0, engine="compiled")
     calls.clear()
     last = osimlite.simulate(model, to=1.0, engine="compiled")
-    # Unless the machine stood still for a moment, one; in any case fewer than before anything was
-    # known.
+    # One call if the machine does not pause; in any case fewer than without a known speed.
     assert len(calls) < at_first
     assert np.array_equal(first.values, last.values)
     assert first.summary["contact_events"] == last.summary["contact_events"]

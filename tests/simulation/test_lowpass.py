@@ -1,4 +1,4 @@
-"""The low-pass filter without OpenSim: short records, and what it leaves of a wave."""
+"""Tests of the low-pass filter without OpenSim: short records, and its effect on a sine wave."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def test_what_does_not_change_stays(rows):
 
 
 def test_a_wave_at_the_cutoff_loses_half_of_its_size():
-    """Half of the power each time, and the filter is run twice."""
+    """At the cutoff, one pass halves the power, and the filter runs twice."""
     times = np.arange(2001) / 500.0
     _, values = filter_lowpass(times, np.sin(2.0 * np.pi * 6.0 * times)[:, None], 6.0)
     middle = values[len(values) // 2 - 250 : len(values) // 2 + 250]
@@ -32,7 +32,7 @@ def test_one_row_is_no_motion():
 
 
 def test_a_slow_filter_keeps_its_digits() -> None:
-    """Of what forty digits give, ten are kept, though the factors of a slow filter nearly cancel."""
+    """Ten digits agree with a computation with forty digits, although the factors of a slow filter nearly cancel."""
     values = np.random.default_rng(5).normal(size=400).cumsum()
     _, result = filter_lowpass(np.arange(400) / 600.0, values[:, None], 2.5)
     continued = [

@@ -1,4 +1,4 @@
-"""Motions of meshes on an elastic foundation, and where their files are looked for."""
+"""Tests of motions of meshes on an elastic foundation, and of the search for mesh files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Muscles over coordinates as tables of other libraries, and in notebooks; `tests/oracle/` has their numbers."""
+"""Tests of muscle curves as tables of other libraries and in notebooks; `tests/oracle/` checks the numbers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Static optimization in one call: small models of which the answer is known."""
+"""Tests of `static_optimization` on small models with known solutions."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ NEEDED = 2.0 * (1.0 + 9.80665)
 
 
 def lift(*strengths: float) -> osimlite.Model:
-    """A body of 2 kg that moves upwards, with actuators of these strengths."""
-    # The slider runs along x.
+    """Return a body of 2 kg that moves upwards, with actuators of these strengths (N)."""
+    # The slider runs along its x axis, which is turned upwards.
     return make_slide(
         *(actuator(f"a{number}", strength) for number, strength in enumerate(strengths)),
         coordinate="y",
@@ -48,7 +48,7 @@ def actuator(name: str, strength: float, **more: float) -> osimlite.CoordinateAc
 
 @pytest.mark.parametrize("exponent", [1.5, 2.0, 3.0, 10.0])
 def test_the_shares_are_those_of_the_strengths(exponent: float) -> None:
-    """Where nothing bounds them, x is in proportion to the strengths to the power of 1 / (p - 1)."""
+    """Without bounds, forces are proportional to the strengths to the power of 1 / (p - 1)."""
     found = osimlite.static_optimization(
         lift(30.0, 10.0), {"y": UP}, times=TIMES, exponent=exponent
     )
@@ -76,7 +76,7 @@ def test_one_actuator_bounds_and_forces_from_files(tmp_path: Path) -> None:
     other = osimlite.static_optimization(
         lift(30.0), {"y": UP}, times=TIMES, forces=reserves.objects, replace_forces=True
     )
-    # Two newtons are all that it has.
+    # Two newtons are the limit of the reserve.
     assert other.columns == ("reserve",)
     assert not other.solved.any() and np.isnan(other.rows).all()
     assert "no solution at 51 of 51 times (the first is 0 s)" in (said := other.describe_unsolved())
@@ -137,7 +137,7 @@ def test_what_has_no_single_control_is_refused() -> None:
 
 
 def test_random_bounds_never_end_in_a_traceback() -> None:
-    """Either all equations hold within the bounds, or nothing is said; massless bodies and useless actuators too."""
+    """All equations hold within the bounds, or the result is NaN; masses of 0 and useless actuators occur too."""
     rng = np.random.default_rng(7)
     solved = 0
     count = choose(60, 300)
@@ -169,7 +169,7 @@ def test_random_bounds_never_end_in_a_traceback() -> None:
 
 
 def test_a_locked_coordinate_stays_where_it_is() -> None:
-    """Nothing of it counts: neither that it moves in the record, nor what it would take."""
+    """Neither its recorded motion nor the moment that it would need counts."""
     free = osimlite.static_optimization(lift(30.0), {"y": UP}, times=TIMES)
     model = lift(30.0)
     other = model.add(osimlite.Body(name="other", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
@@ -187,7 +187,7 @@ def test_a_locked_coordinate_stays_where_it_is() -> None:
 
 
 def test_loads_of_another_class_are_named(tmp_path: Path) -> None:
-    """Old documents have PrescribedForces in their ExternalLoads, which OpenSim refuses."""
+    """Old documents contain PrescribedForces in ExternalLoads, which OpenSim refuses."""
     (tmp_path / "loads.xml").write_text(
         '<OpenSimDocument Version="20302"><ExternalLoads name=""><objects><PrescribedForce name="push"/></objects>'
         "</ExternalLoads></OpenSimDocument>"

@@ -1,6 +1,6 @@
-"""Motions of a block that hangs on a muscle, of an arm and of a gait model, against OpenSim's.
+"""Tests of motions of a block on a muscle, an arm and a gait model against OpenSim's.
 
-These are in `motions.json.gz`, with 7 to 9 real decimals.
+The reference is in `motions.json.gz`, with 7 to 9 valid decimals.
 """
 
 from __future__ import annotations
@@ -44,11 +44,11 @@ REAL = {
     ),
     "gait10dof18musc_default": ("m0005", None),
 }
-"""Models of the corpus and their controls."""
+"""Corpus model and controls of each motion."""
 
 
 def assert_moves_as(case, model, **choices):
-    """Within the digits of OpenSim's numbers that are real."""
+    """Compare a motion with OpenSim's, within the valid digits of the reference."""
     with gzip.open(FOLDER / "motions.json.gz", "rt") as file:
         (motion,) = (item for item in json.load(file) if item["case"] == case)
     expected = np.array(motion["rows"])

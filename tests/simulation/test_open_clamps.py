@@ -1,4 +1,4 @@
-"""Starts that OpenSim 4.6 computes though a clamp or a right angle is in the way; its values were measured."""
+"""Tests of initial states that OpenSim 4.6 accepts beyond a clamp or at a right angle; its values were measured."""
 
 from __future__ import annotations
 

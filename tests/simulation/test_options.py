@@ -1,4 +1,4 @@
-"""The options of a simulation: one list of them, for one call and for a model that is made ready."""
+"""Tests of the options of simulations, which are the same for single calls and for a `Simulation`."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def test_steps_keep_their_bounds():
             simulation.run(0.1, step_bounds=(0.0, 0.01), fixed_step=1e-3)
         with pytest.raises(SettingError, match=r"no effect on the steps of 'adams'; .*merson or"):
             simulation.run(0.1, step_bounds=(0.0, 0.01), integrator="adams")
-        # The first step of a batch keeps them too: without bounds it is 0.01 s.
+        # The first step of a batch also respects them: without bounds it is 0.01 s.
         (start,) = simulation.engine.run_many(
             [simulation.initial_state({}, {})],
             BatchOptions(to=0.01, accuracy=0.01, step_bounds=(0.0, 1e-3)),

@@ -1,4 +1,4 @@
-"""Paths in many poses at once are what they are in each."""
+"""Tests of paths in many poses at once against single poses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Paths around surfaces, against tables of what OpenSim 4.6 computes."""
+"""Tests of paths around surfaces against tables from OpenSim 4.6."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def test_wrapped(name):
     "name", [name for name, setup in SETUPS.items() if len(setup["objects"]) > 1]
 )
 def test_several_as_python(name, monkeypatch):
-    """Nothing is read or written outside of what belongs to a path."""
+    """Kernels of a path access only their own vectors."""
     monkeypatch.setattr("osimlite.simulation.evaluation.select_code", lambda: Checked("Python"))
     paths = osimlite.paths(wrapped(SETUPS[name]))
     for case in SETUPS[name]["cases"][:1]:

@@ -1,4 +1,4 @@
-"""Lengths, speeds and moment arms of the paths of a model."""
+"""Tests of lengths, lengthening speeds and moment arms of the paths of a model."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from tests.simulation.elements.muscle_rows import hung, line
 from tests.simulation.force_cases import FORCES, with_force
 
 FILES = {"gait10dof18musc": "m0005", "gait2392": "m0014"}
-"""Where the models are in the corpus."""
+"""Ids of the models in the corpus."""
 
 
 @pytest.mark.parametrize("name", FILES)
 def test_muscles(name, shared):
-    """All poses of a table of OpenSim's."""
+    """Compare all poses of a table from OpenSim."""
     with gzip.open(shared / "oracle" / "muscles" / "moment_arms.json.gz") as file:
         table = next(item for item in json.load(file) if item["model"] == name)
     (file,) = (shared / "corpus" / "models" / FILES[name]).glob("*.osim")
@@ -66,7 +66,7 @@ def test_a_force_that_does_not_act_has_a_path_too():
 
 
 def test_moment_arms_are_what_the_length_loses():
-    """Where nothing jumps and nothing wraps, and where the coordinates are those of pins and slides."""
+    """Moment arms are minus the derivatives of the length, where nothing wraps and joints are simple."""
     paths = osimlite.paths(with_force(FORCES["path"]))
     pose = paths.mechanism.values({"q0_3": 0.4, "q2_0": 0.3})
     arms = paths.moment_arms(pose)["/forceset/a"]
@@ -83,7 +83,7 @@ def test_moment_arms_are_what_the_length_loses():
 
 
 def test_points_in_one_place_pull_nothing():
-    """What is left then are the pieces between the bodies, which move nothing in ground."""
+    """The remaining segments lie between the bodies, and move nothing relative to ground."""
     model = with_force(FORCES["path"])
     points = model["/forceset/a"].geometry_path.path_point_set.objects
     place = invert_transform(osimlite.mechanism(model).body_transforms({})["b0"]) @ (

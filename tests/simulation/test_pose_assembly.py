@@ -1,4 +1,4 @@
-"""Motions assembled by the kernels: the poses that the search in Python finds, on any mechanism."""
+"""Tests of motions that kernels assemble, against the search in Python, for random mechanisms."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from tests.suite import choose
 
 
 def change_of(mechanism: Mechanism, poses: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """Return the squared change that counts of each pose."""
+    """Return the squared change of each pose that assembly minimizes."""
     counted = np.array([not info.yielding for info in mechanism.coordinates])
     return ((poses - wanted) ** 2 * counted).sum(axis=1)
 
@@ -42,8 +42,7 @@ def compare(
         errors = np.concatenate([item.position_errors(state) for item in mechanism.constraints])
         assert np.abs(errors).max(initial=0.0) <= tolerance_of(mechanism)
     least, change = change_of(mechanism, known, wanted), change_of(mechanism, result, wanted)
-    # A pose that is off by `accuracy` across the equations changes the squared distance to first
-    # order.
+    # An error of `accuracy` along the constraints changes the squared distance to first order.
     assert (np.abs(change - least) <= 1e-12 + 2.0 * np.sqrt(least) * accuracy).all()
     assert np.abs(result - known).max() < accuracy
 
@@ -67,7 +66,7 @@ def test_any_mechanism(case: Case, kind: str, seed: int, what: str, off: float) 
         near = mechanism.assemble(case.q, 0.7)
     except SimulationError:
         return
-    # Where the equations are almost singular, the nearest pose is hardly defined.
+    # Where the equations are almost singular, the nearest pose is ill-conditioned.
     rows = constraint.velocity_equations(mechanism.at(near, time=0.7))[0]
     strengths = np.linalg.svd(rows, compute_uv=False)
     assume(strengths.min(initial=1.0) > 1e-2 * strengths.max(initial=1.0))
@@ -121,7 +120,7 @@ def test_couplers_prescribed_and_clamped_coordinates(
 
 
 def test_loops(fixtures) -> None:
-    """Poses far from the constraints, whose curvature counts."""
+    """Start far from the constraints, where their curvature matters."""
     model = osimlite.Model(name="loop")
     last = model.ground
     for number in range(4):
@@ -154,7 +153,7 @@ def test_loops(fixtures) -> None:
 @pytest.mark.parametrize("scale", [1.0, 1e-20, 1e20])
 @pytest.mark.parametrize("size", [1, 2, 5, 12])
 def test_eigenvalues(size: int, scale: float) -> None:
-    """Of small and large numbers alike: the search ends by the ratio of entries, not by their size."""
+    """The search ends by the ratio of matrix entries, so that their magnitude does not matter."""
     matrix = scale * np.random.default_rng(size).normal(size=(size, size))
     matrix += matrix.T
     work, vectors = matrix.copy().reshape(-1), np.zeros(size * size)

@@ -1,4 +1,4 @@
-"""Who else can write a file whose content is run: its folder, those above, and itself."""
+"""Tests of the check that no other user can write a file whose content is executed, or its folders."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ pytestmark = pytest.mark.skipif(
 
 @pytest.fixture
 def kept(tmp_path: Path) -> Path:
-    """A file in two new folders."""
+    """Write a file in two new folders, and return its path."""
     write_private(tmp_path / "outer" / "inner" / "kept", b"code")
     return tmp_path / "outer" / "inner" / "kept"
 
@@ -49,7 +49,7 @@ def test_a_folder_that_others_can_write_is_not_used(kept, mode, up):
     place = kept.parents[up]
     place.chmod(mode)
     if up and mode & 0o1000:
-        # Others can put nothing in the place of a folder of ours there.
+        # With the sticky bit, others cannot replace our folder.
         assert read_private(kept) == b"code"
         return
     assert read_private(kept) is None
@@ -82,7 +82,7 @@ def test_links_are_followed_to_where_they_lead(kept, tmp_path):
     kept.parent.chmod(0o777)
     assert read_private(tmp_path / "way" / "kept") is None
     kept.parent.chmod(0o700)
-    # A file is none of ours if it is but a link to one.
+    # A link to a file is not accepted.
     (kept.parent / "alias").symlink_to(kept)
     assert read_private(kept.parent / "alias") is None
 

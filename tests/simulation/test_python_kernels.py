@@ -1,4 +1,4 @@
-"""Every kernel as Python, where a place outside a vector is an error: machine code would read or write there."""
+"""Tests of every kernel as Python with bounded vectors, where machine code would access other memory."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def compare(model: osimlite.Model, monkeypatch: pytest.MonkeyPatch, count: int =
         ours, theirs = plain.compute_derivative(t, y), compiled.compute_derivative(t, y)
         assert np.allclose(ours, theirs, rtol=1e-12, atol=1e-12 * max(1.0, np.abs(theirs).max()))
         with monkeypatch.context() as patched:
-            # What the derivative leaves: as Python, it takes long to compute it again.
+            # Records remain from the derivative; computing it again in Python would take long.
             patched.setattr(plain, "compute_applied_forces", lambda t, y: None)
             records = plain.force_records(t, y)
         assert np.allclose(records, compiled.force_records(t, y), rtol=1e-9, atol=1e-9)

@@ -1,4 +1,4 @@
-"""Initial states, settings, failures and what a simulation leaves."""
+"""Tests of simulations: initial states, settings, failures and result files."""
 
 from __future__ import annotations
 
@@ -177,7 +177,7 @@ def test_progress_needs_no_recorded_row(pendulum, engine, fixed_step):
 
 
 def interrupting(after: int):
-    """Presses Ctrl-C when it is called for the last of so many times."""
+    """Return a progress function that raises SIGINT when it is called for the `after`-th time."""
     left = [after]
 
     def progress(t: float, step: float) -> None:
@@ -201,7 +201,7 @@ def test_what_was_recorded_before_ctrl_c_is_kept(pendulum, engine, choices, afte
         part = stopped.value.trajectory
         end = part.times[-1]
         assert 0.0 < end < duration
-        # The same rows up to there, and one of where it ended.
+        # The rows are the same up to the interruption, plus one row for its time.
         rows = int(np.searchsorted(whole.times, end))
         assert len(part.times) == rows + 1
         assert np.array_equal(part.values[:rows], whole.values[:rows])
@@ -218,7 +218,7 @@ def test_what_was_recorded_before_ctrl_c_is_kept(pendulum, engine, choices, afte
 @pytest.mark.parametrize("engine", ["bullet", "compiled"])
 @pytest.mark.parametrize("choices", [{"accuracy": 1e-6}, {"fixed_step": 7e-3}])
 def test_what_was_recorded_before_a_failure_is_kept(pendulum, engine, choices):
-    """A force that is no number beyond half a radian."""
+    """The force is NaN beyond half a radian."""
     (angle,) = pendulum.components(Coordinate)
     pendulum.add(
         osimlite.ExpressionBasedCoordinateForce(coordinate=angle.name, expression="sqrt(0.5-q)")
@@ -240,7 +240,7 @@ def test_what_was_recorded_before_a_failure_is_kept(pendulum, engine, choices):
 
 
 def test_ctrl_c_before_the_first_step(pendulum, monkeypatch):
-    """Within machine code, which is heard only when it ends."""
+    """The signal arrives in machine code, and is handled when that ends."""
     with Simulation(pendulum, "compiled") as simulation:
         monkeypatch.setattr(
             BatchWorkspace, "run", lambda batch, room: signal.raise_signal(signal.SIGINT)
@@ -285,7 +285,7 @@ def test_free_fall():
 
 
 def test_spinning_top_keeps_its_momentum():
-    """Torque-free rotation of a body with three different moments, where the speeds are not rates of angles."""
+    """A body with three different moments of inertia rotates freely; speeds are not rates of angles."""
     model = Model(name="top", gravity=(0.0, 0.0, 0.0))
     top = model.add(Body(name="top", mass=1.0, inertia=(1.0, 2.0, 2.5, 0.0, 0.0, 0.0)))
     joint = osimlite.BallJoint(name="ball")
@@ -379,7 +379,7 @@ def test_constraint_is_refused(pendulum):
 
 
 def test_first_steps_are_as_short_as_it_takes(pendulum):
-    """A limit harder than steel throws the pendulum away, in as many steps as in OpenSim."""
+    """A stiff limit throws the pendulum away, in as many steps as in OpenSim."""
     pendulum.add(
         CoordinateLimitForce(
             name="steel",

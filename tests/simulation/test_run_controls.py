@@ -1,4 +1,4 @@
-"""Controls that a run is given: what they do, any number of times, and what is told of those that do not fit."""
+"""Tests of controls as arguments of a run: their effect, repeated runs, and error messages."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ TIMES, VALUES = (0.0, 0.1, 0.3), (1.0, 3.0, -1.0)
 
 @pytest.fixture(scope="module")
 def model() -> Model:
-    """The first actuator is driven by the model itself too."""
+    """Return a model with three actuators, the first of which a controller of the model drives."""
     made = arm()
     made.add(
         CoordinateActuator(name="first", coordinate="q0"),
@@ -44,7 +44,11 @@ def ready(request, model):
 
 
 def controls_of(ready, given) -> tuple[np.ndarray, np.ndarray]:
-    """Those of the first two actuators, by the forces that they exert."""
+    """Run a simulation with these controls.
+
+    Returns:
+        Times, and the controls of the first two actuators by the forces that they exert (2, t).
+    """
     trajectory = ready.run(0.3, controls=given)
     return trajectory.times, np.array([trajectory.forces[name] for name in ("first", "second")])
 
@@ -67,7 +71,7 @@ GIVEN = {
 @pytest.mark.filterwarnings("ignore::osimlite.errors.DoubtfulWarning")
 @pytest.mark.parametrize(("given", "expected"), GIVEN.values(), ids=GIVEN)
 def test_what_a_control_may_be(ready, given, expected):
-    """It adds to what the model does, and what nothing drives is 0; the run after it knows nothing of it."""
+    """A control is added to that of the model; without either it is 0. The next run does not use it."""
     times, result = controls_of(ready, {"first": given, "/forceset/push_4": 1.0})
     assert result == pytest.approx(np.array([0.5 + expected(times), 0.0 * times]), abs=1e-12)
     times, result = controls_of(ready, None)
@@ -93,7 +97,7 @@ def test_a_motion_is_that_of_a_controller_more(model, tmp_path):
 
 
 def test_a_trajectory_keeps_the_controls_of_its_run(model):
-    """Forces and energies are worked out when they are asked for."""
+    """Forces and energies are computed when they are read, possibly after another run."""
     with Simulation(model, "compiled") as ready:
         first, second = (ready.run(0.1, controls={"second": value}) for value in (1.0, 2.0))
     assert (first.forces["second"] == 1.0).all()

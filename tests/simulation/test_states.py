@@ -1,4 +1,4 @@
-"""What a state consists of: every engine and every batch takes states of its own length, and keeps all of them."""
+"""Tests of states: every engine and every batch checks their length, and handles all states of the forces."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def test_a_state_of_another_length_is_refused(simulations, engine, y):
 
 
 def test_nothing_of_the_call_before_is_left(simulations):
-    """A vector without its tail is no state, whatever was computed before it."""
+    """A state of the wrong length is rejected, whatever was computed before."""
     engine = simulations["compiled"].engine
     y = engine.state.pack_defaults()
     engine.compute_derivative(0.0, [*y[:-1], 5.0])
@@ -86,7 +86,7 @@ class Element:
 
 
 def test_states_have_the_order_and_the_starts_of_their_owners():
-    """Simbody's own come last; the states of one element stay together."""
+    """States that Simbody adds come last; the states of one element stay together."""
     mechanism = build_mechanism(damped())
     muscle = Element(
         StateVariable("/m/activation", 0.05),
@@ -115,7 +115,7 @@ def test_states_have_the_order_and_the_starts_of_their_owners():
 
 
 def with_states(seed):
-    """A random model, and a start of each of its auxiliary states."""
+    """Return a random model, and a random initial value of each of its auxiliary states."""
     random = RandomModel(seed)
     random.model.add(random.bushing("bushing"))
     with Simulation(random.model, "compiled") as simulation:
@@ -125,7 +125,7 @@ def with_states(seed):
 @settings(max_examples=10, deadline=None, derandomize=True, phases=[Phase.generate])
 @given(seed=st.integers(0, 10**6))
 def test_random_models_keep_their_states(seed, tmp_path_factory):
-    """Through both engines, with both kinds of steps, in a batch, and through a file."""
+    """Run both engines with both kinds of steps, as a batch, and from a file."""
     from osimlite.simulation.batches import run_many
 
     model, z = with_states(seed)
@@ -138,7 +138,7 @@ def test_random_models_keep_their_states(seed, tmp_path_factory):
                 trajectory = simulation.run(0.02, initial=z, **step)
                 assert {path: rows[0] for path, rows in trajectory.auxiliary.items()} == z
                 ends[engine, *step] = [rows[-1] for rows in trajectory.auxiliary.values()]
-                # What the dampers take up is counted on from there.
+                # Dissipated energies continue from their initial values.
                 assert (
                     np.array(ends[engine, *step])
                     >= np.array([z[path] for path in trajectory.auxiliary])
@@ -149,7 +149,7 @@ def test_random_models_keep_their_states(seed, tmp_path_factory):
             history = simulation.state.pack_rows(
                 trajectory.values, trajectory.speeds, trajectory.auxiliary
             )
-            # Constraints hold a little better at a start.
+            # The initial state of a run is projected, and fulfils constraints a little better.
             assert last == pytest.approx(
                 history[-1].tolist(), abs=1e-7 if simulation.constraints else 0.0, rel=0.0
             )
@@ -176,7 +176,7 @@ def test_random_models_keep_their_states(seed, tmp_path_factory):
     assert ends["bullet", "accuracy"] == pytest.approx(
         ends["compiled", "accuracy"], rel=1e-7, abs=1e-9
     )
-    # Bullet steps the rates of its joints, which not all are the generalized speeds.
+    # Bullet integrates the rates of its joints, some of which are not the generalized speeds.
     for engine in ("bullet", "compiled"):
         assert ends[engine, "fixed_step"] == pytest.approx(
             ends["compiled", "accuracy"], rel=0.1, abs=0.1
@@ -184,7 +184,7 @@ def test_random_models_keep_their_states(seed, tmp_path_factory):
 
 
 def test_what_a_file_says_gives_way_to_what_holds(tmp_path):
-    """Locked coordinates stay; a name that is given besides counts more than the file."""
+    """Locked coordinates keep their values; names in the call have priority over the file."""
     file = tmp_path / "states.sto"
     osimlite.simulate(damped(), 0.1).to_sto(file)
     with Simulation(damped(), "compiled") as simulation:

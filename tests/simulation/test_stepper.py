@@ -1,4 +1,4 @@
-"""Where steps and reports end, and the motion in between."""
+"""Tests of the ends of steps and reports, and of the interpolation in between."""
 
 from __future__ import annotations
 
@@ -16,15 +16,18 @@ from tests.simulation.equations import Counting, last, oscillator, pendulum, run
 @pytest.mark.parametrize(
     ("limit", "ends"),
     [
-        (0.005, [0.005, 0.015]),  # cut short: no reason to grow
+        (0.005, [0.005, 0.015]),  # a step that is cut short does not let the next one grow
         (0.0094, [0.0094, 0.0194]),
-        (0.0096, [0.0096, 0.0596]),  # all but a whole step: five times as much next
-        (0.010005, [0.010005, 0.060005]),  # little more than a whole step: stretched to the limit
-        (0.0102, [0.01, 0.0102, 0.0602]),  # a remainder needs a step of its own
+        (0.0096, [0.0096, 0.0596]),  # nearly a complete step: the next one is five times as large
+        (
+            0.010005,
+            [0.010005, 0.060005],
+        ),  # a little more than a complete step: it is stretched to the limit
+        (0.0102, [0.01, 0.0102, 0.0602]),  # the remainder needs another step
     ],
 )
 def test_steps_near_a_limit(limit, ends):
-    """No error at all, so that the first step is the initial one of 0.01 s and any growth is fivefold."""
+    """Without errors, the first step is the initial one of 0.01 s, and each growth is fivefold."""
     integrator = runge_kutta_merson(lambda t, y: [y[1], 0.0], 0.0, [0.0, 0.0], 1)
     times = [t for t, _ in integrator.iterate_steps(limit)]
     integrator.step()

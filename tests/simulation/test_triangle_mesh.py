@@ -1,4 +1,4 @@
-"""Meshes for contact: reading, nearest points, what is refused."""
+"""Tests of meshes for contact: reading, nearest points, errors."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def kind(request):
 @pytest.mark.parametrize("shape", [ball, block])
 def test_files_of_all_kinds(kind, shape, tmp_path):
     points, faces = shape((0.5, 0.4, 0.6))
-    # An inside-out surface is turned.
+    # A surface that is inside out is reversed.
     WRITERS[kind](tmp_path / f"mesh{kind}", points, [face[::-1] for face in faces])
     mesh = TriangleMesh.read(f"mesh{kind}", MeshFolders(tmp_path))
     corners = triangles(points, faces)
@@ -47,7 +47,7 @@ def test_corners_of_stl_files_that_are_nearly_in_one_place(tmp_path):
 def test_many_corners_make_a_fan_about_their_middle(tmp_path):
     WRITERS[".obj"](tmp_path / "block.obj", *block((1.0, 1.0, 1.0)))
     mesh = TriangleMesh.read("block.obj", MeshFolders(tmp_path))
-    # Two hexagons and six quadrilaterals.
+    # The mesh has two hexagons and six quadrilaterals.
     assert len(mesh.triangles) == 2 * 6 + 6 * 2
     assert mesh.points[-2:] == pytest.approx(np.array([(0.0, 0.0, -1.0), (0.0, 0.0, 1.0)]))
 
@@ -57,13 +57,13 @@ def test_nearest_points():
     mesh = TriangleMesh.from_corners(triangles(points, faces), "ball.stl")
     rng = np.random.default_rng(3)
     places = rng.uniform(-0.7, 0.7, (200, 3))
-    # Straight out of edges and corners, where several triangles are equally near.
+    # Add points straight out of edges and corners, where several triangles are equally near.
     places = np.concatenate([places, 1.3 * mesh.points, 0.9 * mesh.points])
     result, inside = mesh.find_nearest(places)
     size = np.linalg.norm(places, axis=1)
     sure = np.abs(size - 0.5) > 0.02
     assert np.array_equal(inside[sure], size[sure] < 0.5)
-    # No place of the surface is nearer: corners, middles and points on edges.
+    # No sampled point of the surface is nearer: corners, centroids and midpoints of edges.
     edges = 0.5 * (mesh.corners + np.roll(mesh.corners, 1, axis=1)).reshape(-1, 3)
     some = np.concatenate([mesh.points, mesh.centroids, edges])
     nearest = np.linalg.norm(places[:, None] - some, axis=2).min(axis=1)

@@ -1,4 +1,4 @@
-"""The walker's motion against OpenSim's converged one."""
+"""Tests of the walker's motion against OpenSim's converged one."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def test_motion_at_high_accuracy(precise, reference):
 
 
 def test_steps_are_those_of_opensim(simulation):
-    """OpenSim's Manager takes 135 of 173 steps and 828 evaluations with its default settings."""
+    """With default settings, OpenSim's Manager takes 135 of 173 steps and 828 evaluations."""
     summary = simulation.run(2.0).summary
     assert (summary["steps"], summary["attempted_steps"], summary["evaluations"]) == (135, 173, 828)
 
@@ -56,7 +56,7 @@ def test_fixed_steps_converge_at_first_order(simulation, reference):
 
 
 def test_contact_forces(precise, reference):
-    """Every component within 1e-5 of the largest force (or torque) that its contact ever has."""
+    """Every component differs by at most 1e-5 of the largest force (or torque) of its contact."""
     table, checked = reference("contact_forces"), 0
     for label, expected in table.items():
         if label == "time":
@@ -72,7 +72,7 @@ def test_contact_forces(precise, reference):
         size = max(np.abs(table[f"{element}.{kind}.{other}"]).max() for other in "XYZ")
         assert np.abs(ours - expected).max() <= 1e-5 * size
         checked += size > 0.0
-    # Four contacts, of force and torque.
+    # Four contacts have three components of force and of torque each.
     assert checked == 4 * 6
 
 
@@ -134,7 +134,7 @@ def test_largest_forces(precise):
     result = {
         name: entry["force_N"] for name, entry in precise.summary["largest_contact_forces"].items()
     }
-    # OpenSim's largest at full milliseconds.
+    # The largest forces of OpenSim at full milliseconds; between these they may be larger.
     sampled = {
         "RFootForce": 333.916,
         "LFootForce": 180.838,

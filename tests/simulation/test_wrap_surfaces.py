@@ -1,4 +1,4 @@
-"""How a path bends around one surface, against OpenSim: as Python, with every place checked, and as machine code."""
+"""Tests of paths around one surface against OpenSim, as Python with bounded vectors and as machine code."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ SETUPS = {setup["name"]: setup for setup in TABLE if len(setup["objects"]) == 1}
 
 
 def numbers(surface, *, alone):
-    """The numbers of a surface."""
+    """Return the parameters of a surface as its law expects them."""
     axis, side = SIDES[surface["quadrant"]]
     return np.array(
         [axis, side, METHODS[surface["method"]], alone, *surface["dimensions"]], dtype=float
@@ -46,7 +46,11 @@ def numbers(surface, *, alone):
 
 
 def bent(law, p, first, second):
-    """What a law says of a piece of a path."""
+    """Evaluate the law of a surface for one segment of a path.
+
+    Returns:
+        Result code, tangent points (2, 3), and the length on the surface.
+    """
     e = np.full(wrapping.WRAP_WORK.END, 7.0)
     e[wrapping.WRAP_WORK.FIRST_END : wrapping.WRAP_WORK.FIRST_TANGENT] = *first, *second
     item, state = np.zeros(ITEM.OWN, dtype=np.int64), np.zeros(1)

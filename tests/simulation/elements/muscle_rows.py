@@ -1,4 +1,4 @@
-"""One muscle between ground and a block on a slider, and what OpenSim 4.6 computes for it."""
+"""Model of one muscle between ground and a block on a slider, and tables of what OpenSim 4.6 computes for it."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ MASS = 20.0
 
 
 def table(name: str, case: str) -> list[dict[str, str]]:
-    """The rows of a case."""
+    """Return the rows of a case in a table."""
     with gzip.open(FOLDER / f"{name}.csv.gz", "rt") as file:
         return [row for row in csv.DictReader(file) if row["case"] == case]
 
 
 def muscle(case: str, **more: Any) -> Any:
-    """The muscle of a case, along `path`."""
+    """Return the muscle of a case with the path of `line`; `more` sets further properties."""
     settings = CONFIGURATIONS[case]
     base = {NAMES[name]: value for name, value in {**USUAL, **settings["base"]}.items()}
     own = {name: value for name, value in settings.items() if name not in ("cls", "base")}
@@ -45,7 +45,7 @@ def muscle(case: str, **more: Any) -> Any:
 
 
 def line() -> GeometryPath:
-    """A path as long as the coordinate of the block says."""
+    """Return a path whose length is the coordinate of the block."""
     path = GeometryPath(name="path")
     for name, frame in (("a", "/ground"), ("b", "/bodyset/block")):
         path.path_point_set.objects.append(PathPoint(name=name, socket_parent_frame=frame))
@@ -53,7 +53,13 @@ def line() -> GeometryPath:
 
 
 def hung(force: Any, excitations: Sequence[float] = (0.0,), gravity: float = 0.0) -> Model:
-    """The model with a muscle, excited so much at the time 0, 1, 2 ..."""
+    """Return the model with a muscle.
+
+    Args:
+        force: the muscle.
+        excitations: excitation at the times 0, 1, 2 ... s.
+        gravity: gravity along the slider (m/s²).
+    """
     model = make_slide(force, name="one", body="block", mass=MASS, gravity=(gravity, 0.0, 0.0))
     brain = PrescribedController(name="brain", socket_actuators=(f"/forceset/{force.name}",))
     times = tuple(map(float, range(len(excitations) + 1)))

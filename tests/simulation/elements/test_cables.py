@@ -1,4 +1,4 @@
-"""The search for a cable over its obstacles while a model is built."""
+"""Tests of the search for a cable over its obstacles while a model is built."""
 
 from __future__ import annotations
 

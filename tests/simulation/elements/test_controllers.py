@@ -1,4 +1,4 @@
-"""Controllers whose parts do not fit, and files of controls with faults."""
+"""Tests of controllers with contradictory properties, and of faulty files of controls."""
 
 from __future__ import annotations
 

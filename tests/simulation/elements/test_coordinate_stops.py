@@ -1,4 +1,4 @@
-"""Forces that OpenSim has only after 4.6, so that no live comparison is there: their formulas, worked out by hand."""
+"""Tests of forces that OpenSim introduced after 4.6, against their formulas, because OpenSim 4.6 cannot be compared."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from tests.simple_models import make_slide
 
 
 def slide(force) -> osimlite.Model:
-    """A body of 2 kg on a slide without gravity."""
+    """Return a model of a body of 2 kg on a slide without gravity."""
     return make_slide(force, mass=2.0, gravity=(0.0, 0.0, 0.0))
 
 

@@ -1,4 +1,4 @@
-"""The declarations of forces: what follows from each."""
+"""Tests of the declarations of force types: kernel, states, outputs and the page of the manual."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def test_the_kernel_follows_from_the_declaration(force_type):
     source = inspect.getsource(force_type.text.kernel)
     assert source.startswith(f"def {force_type.name}(") and source.endswith("return OUTCOME.OK\n")
     assert force_type.law is None or " law(" in source
-    # What the geometry applies is given by the law.
+    # The geometry applies outputs of the law.
     applied = set(re.findall(r"\w+", " ".join(force_type.geometry.apply_code)))
     assert applied & {"force", "torque", "tension", "fx", "fy", "fz"} <= set(
         force_type.outputs
@@ -62,7 +62,7 @@ def test_the_states_are_those_that_the_class_declares(force_type):
     ],
 )
 def test_the_states_that_are_left_are_opensims(cls, without_activation, without_tendon):
-    """As OpenSim 4.6 names them."""
+    """Compare with the states that OpenSim 4.6 has."""
     for flag, left in (
         ("ignore_activation_dynamics", without_activation),
         ("ignore_tendon_compliance", without_tendon),
@@ -71,7 +71,7 @@ def test_the_states_that_are_left_are_opensims(cls, without_activation, without_
 
 
 def test_a_law_takes_what_the_kernel_gives():
-    """One argument for each input, state and parameter."""
+    """The call of a law in the kernel has one argument for each input, state and parameter."""
     for force_type in DECLARED:
         if force_type.law is not None:
             calls = [

@@ -1,4 +1,4 @@
-"""The muscles against OpenSim's own numbers: derivatives, forces, energy, equilibrium."""
+"""Tests of muscles against tables from OpenSim: state derivatives, forces, energies and equilibria."""
 
 from __future__ import annotations
 
@@ -41,11 +41,11 @@ RECORDED = {
     "active_fiber_force": "ActiveFiberForce",
     "passive_fiber_force": "PassiveFiberForce",
 }
-"""What of a record is what of the table."""
+"""Column of OpenSim's table for each value of the record of a muscle."""
 
 
 DIGITS = {"Millard2012EquilibriumMuscle": 2e-11, "Millard2012AccelerationMuscle": 2e-11}
-"""How exactly the numbers of a muscle are known, where it is not 2e-12."""
+"""Relative tolerance for classes of muscles with less precise numbers; 2e-12 for all others."""
 
 
 NOWHERE = r"no equilibrium was found for '/forceset/mu', whose path of 0\.\d+ m is 0\.\d+ m (long|short)er than the sum"
@@ -89,16 +89,16 @@ def test_derivatives_forces_and_energy(case, code):
         ours |= {theirs: known[own] for own, theirs in RECORDED.items() if row[theirs] != "n/a"}
         for name, value in ours.items():
             expected = float(row[name])
-            # What is a difference of forces has the digits of these.
+            # A difference of forces has an absolute error, which is relative to the strength.
             scale = (
                 1e-3 * digits * known["max_isometric_force"]
                 if "Force" in name or name == "Actuation"
                 else 0.0
             )
             if is_searched:
-                # OpenSim's search for the velocity leaves 1e-10 of the strength.
+                # OpenSim's search for the fiber velocity leaves an error of 1e-10 of the strength.
                 scale += 2e-10 * (known["max_isometric_force"] if scale else 100.0)
-            # Exponentials of large numbers have fewer.
+            # Exponentials of large numbers have a larger relative error.
             close = digits if abs(expected) < 1e6 else 1e-10
             assert value == pytest.approx(expected, rel=close, abs=1e-14 + scale, nan_ok=True), (
                 number,
@@ -106,7 +106,7 @@ def test_derivatives_forces_and_energy(case, code):
             )
         assert force == pytest.approx(-known["tension"], rel=1e-15)
         if is_searched and known["fiber_velocity"] != 0.0:
-            # Here it leaves rounding.
+            # The search of osimlite converges to rounding errors.
             borne = (known["active_fiber_force"] + known["passive_fiber_force"]) * known[
                 "cos_pennation"
             ]
@@ -116,7 +116,7 @@ def test_derivatives_forces_and_energy(case, code):
         assert ready.force_records(float(number), y) == [known["tension"]]
         parts = [row[f"{part}PotentialEnergy"] for part in ("Fiber", "Tendon")]
         stored = 0.0 if "n/a" in parts else sum(map(float, parts))
-        # OpenSim's integrals of Millard's curves are splines.
+        # OpenSim's integrals of Millard's curves are spline approximations.
         close = 1e-4 if "millard" in case else 1e-8
         assert ready.compute_energies(float(number), y)[2] == pytest.approx(
             stored, rel=close, abs=0.001 * close
@@ -156,7 +156,7 @@ def test_a_motion_may_start_in_equilibrium():
         fiber = trajectory.auxiliary[path][0]
         engine, rest = simulation.engine, simulation.initial_state(resting, {}, equilibrate=True)
         assert rest[-1] == fiber and abs(engine.compute_derivative(0.0, rest)[-1]) < 1e-6
-        # What is given stays, and without the option nothing is found.
+        # An initial fiber length is kept, and without the option no equilibrium is computed.
         assert (
             simulation.run(0.01, initial={"x": 0.3, path: 0.05}, equilibrate=True).auxiliary[path][
                 0
@@ -259,7 +259,10 @@ def test_an_equilibrium_beyond_all_numbers_is_none(code, words):
 
 
 def test_activation_times_of_the_first_muscle_count_for_all():
-    """Of those of De Groote, as in a process of OpenSim; also where nothing but they changes."""
+    """In a process of OpenSim, the time constants of the first DeGrooteFregly2016Muscle apply to all others.
+
+    This must also hold when only these constants change.
+    """
     from osimlite.simulation.engines.compiled import CompiledEngine
 
     first, other = muscle("dgf_default", activation_time_constant=0.03), muscle("dgf_default")
@@ -292,7 +295,7 @@ def test_activation_times_of_the_first_muscle_count_for_all():
 
 @pytest.mark.parametrize("length", [0.2, 0.6])
 def test_a_tendon_force_that_is_nowhere(length):
-    """OpenSim seeks it between 0 and 5 times the largest force of the fibers."""
+    """OpenSim searches the tendon force between 0 and 5 times the maximum isometric force."""
     words = f"whose path of {length} m is .* than the sum of its tendon_slack_length and optimal_fiber_length; start"
     with pytest.raises(SimulationError, match=f"'/forceset/mu', {words}"):
         system(hung(muscle("dgf_default"))).equilibrate_muscles(0.0, [length, 0.0, 0.3, 0.5])

@@ -1,4 +1,4 @@
-"""Probes without OpenSim: what is told of those that do not fit, where their columns are, and kernels as Python."""
+"""Tests of probes without OpenSim: error messages, columns of results, and kernels as Python."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def model() -> Model:
 
 
 def muscular(**more) -> Model:
-    """A block on a muscle with a probe of all muscles, each by name."""
+    """Return a block on a muscle, with a probe that reports all muscles by name."""
     muscle = Thelen2003Muscle(
         name="mu", optimal_fiber_length=0.1, tendon_slack_length=0.2, geometry_path=line()
     )
@@ -132,7 +132,7 @@ def test_metabolic_probes_that_opensim_switches_off(name, value, words):
 
 
 def test_columns_in_files(tmp_path):
-    """Of the states, integrals are none that OpenSim would name."""
+    """Integrals of probes are columns of probes.sto, and not of the states, which have OpenSim's names."""
     trajectory = osimlite.simulate(muscular(probe_operation="integrate"), to=0.1)
     files = trajectory.write(tmp_path)
     assert tmp_path / "probes.sto" in files
@@ -180,7 +180,7 @@ def test_kernels_as_python(operation):
 
 
 def test_numbers_of_muscles_are_those_of_their_probes():
-    """A model that only numbers have changed in, as in a sweep."""
+    """Changing only numbers of a model, as in a sweep, gives the same as building it anew."""
     model = muscular(probe_operation="integrate")
     with Simulation(model, "compiled") as ready:
         renewal = ready.engine.make_updater(model, Path())

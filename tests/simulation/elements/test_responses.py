@@ -1,4 +1,4 @@
-"""The derivatives of forces along displacements, for implicit integrators, are those of numbers that carry theirs."""
+"""Tests of derivatives of forces for implicit integrators, against automatic differentiation."""
 
 from __future__ import annotations
 
@@ -27,7 +27,15 @@ STATES = 2
 
 
 def jets_of(kind: Any, given: tuple[Any, ...]) -> tuple[list[Any], list[int]]:
-    """What a law was given, with jets for what its response is by, and the columns of these."""
+    """Replace arguments of a law by jets.
+
+    Args:
+        kind: the force type.
+        given: arguments of a call of its law.
+
+    Returns:
+        Arguments with jets for the inputs and states with responses, and the columns of their derivatives.
+    """
     changed, count = kind.text.changed_outputs, len(kind.text.changed_outputs)
     names = [
         *kind.text.input_names,
@@ -38,7 +46,7 @@ def jets_of(kind: Any, given: tuple[Any, ...]) -> tuple[list[Any], list[int]]:
     none = np.zeros(count)
     for direction, place in enumerate(changed.values()):
         flat[place] = Jet(float(flat[place]), np.eye(count)[direction], 0.0, none)
-    # Registers of formulas take jets.
+    # Registers of formulas must hold jets as well.
     rest = [
         part.astype(object) if isinstance(part, np.ndarray) else part
         for part in given[1 if kind.inputs_type else 0 :]
@@ -52,7 +60,7 @@ def jets_of(kind: Any, given: tuple[Any, ...]) -> tuple[list[Any], list[int]]:
 
 @pytest.mark.parametrize("case", [*FORCE_NAMES, *CONFIGURATIONS])
 def test_they_are_derivatives_of_the_law(case, monkeypatch):
-    """In machine code and in Python; of whichever side the law takes where it bends."""
+    """Compare machine code and Python; at a corner the side counts on which the law is evaluated."""
     is_muscle = case in CONFIGURATIONS
     model = hung(muscle(case), (0.4, 0.6)) if is_muscle else with_force(FORCES[case])
     if is_muscle:
@@ -114,7 +122,7 @@ def _noted(given: dict[str, Any], kind: Any, *own: Any) -> Any:
 
 
 def responses(system: System, y: np.ndarray) -> dict[str, np.ndarray]:
-    """The derivatives of each force, by the name of what finds them."""
+    """Return the response derivatives of each force, by the name of the kernel that computes them."""
     s, result = system.program.ints, {}
     for place, name in system.program.responses.items():
         kernel = system.program.code.bind_entry(

@@ -1,4 +1,4 @@
-"""Laws that are compiled alone: kept in private files, not used when damaged or of other sources."""
+"""Tests of laws that are compiled individually: private cache files are ignored if damaged or of other sources."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler
 
 
 def answer(x: int) -> int:
-    """A function that is sooner compiled than any law."""
+    """Return six times x; this function compiles faster than any law."""
     return 6 * x
 
 
 def other_answer(x: int) -> int:
-    """The same with another body."""
+    """Return seven times x; the body differs from that of `answer`."""
     return 7 * x
 
 
 def untranslatable(x: int) -> int:
-    """A function with something that the kernels have not."""
+    """Use a construct that kernels do not support."""
     return len([x])
 
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    """The folder of the files, which does not exist yet."""
+    """Return the folder of the cache, which does not exist yet."""
     monkeypatch.setattr(compiled_laws, "cache_folders", lambda: [tmp_path / "new" / "folder"])
     return tmp_path / "new" / "folder"
 
@@ -66,7 +66,7 @@ def test_another_processor_gets_its_own_files(folder, monkeypatch):
 def test_a_damaged_file_is_not_loaded(folder):
     compile_function("answer", answer, 0)
     library = next(path for path in folder.iterdir() if path.suffix != ".sha256")
-    # The loaded library stays what it is: the damaged one is another file.
+    # The loaded library remains; the damaged library is another file.
     content = library.read_bytes()
     for damaged in (content[:-8], b"", content[:99] + b"x" + content[100:]):
         library.unlink()
@@ -79,7 +79,7 @@ def test_a_damaged_file_is_not_loaded(folder):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="who may write is not told by bits there")
 def test_code_that_others_could_have_written_is_neither_loaded_nor_kept(folder, caplog):
-    """Whoever can write there can write a fitting checksum."""
+    """Others who can write to the folder could also write a valid checksum."""
     compile_function("answer", answer, 0)
     for mode in (0o775, 0o1777, 0o757):
         folder.chmod(mode)
@@ -103,7 +103,7 @@ def test_without_a_folder_the_code_lasts_for_the_process(tmp_path, monkeypatch, 
 
 
 def test_folders(monkeypatch, tmp_path):
-    """The one that is named, or the package's own and then the user's."""
+    """The cache is in the folder that a variable names, or in the package's folder and then in the user's."""
     monkeypatch.setenv(result_cache.CACHE_VARIABLE, str(tmp_path / "named"))
     assert list(result_cache.cache_folders()) == [tmp_path / "named"]
     monkeypatch.delenv(result_cache.CACHE_VARIABLE)
@@ -114,7 +114,7 @@ def test_folders(monkeypatch, tmp_path):
 
 
 def test_a_user_without_a_home(monkeypatch):
-    """As in a container that runs under a number of no user."""
+    """This happens in a container that runs under a user id without an account."""
     for name in (result_cache.CACHE_VARIABLE, "LOCALAPPDATA", "XDG_CACHE_HOME"):
         monkeypatch.delenv(name, raising=False)
 
@@ -139,7 +139,7 @@ def test_without_a_compiler(folder, monkeypatch):
 
 @pytest.mark.full
 def test_a_second_process_compiles_nothing(tmp_path):
-    """The files of one process serve the next, which is given no compiler."""
+    """The files of one process serve the next process, which has no compiler."""
     program = (
         "import sys\n"
         "from osimlite.simulation.engines import machine_code\n"

@@ -1,6 +1,6 @@
-"""What a command that computes does not import: neither numba nor scipy, which cost half a second.
+"""Tests of the imports of commands that simulate: neither numba nor scipy, which take half a second.
 
-Where the library has all kernels, no compiler is started either.
+If the library contains all kernels, no compiler is started either.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ finally:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A walker with a motion and a setup, and an arm with a muscle."""
+    """Write a walker with a motion and a setup, and an arm with a muscle; return the folder."""
     folder = tmp_path_factory.mktemp("commands")
     osimlite.write(dynamic_walker(), folder / "walker.osim")
     arm = hung(muscle("thelen_default"))

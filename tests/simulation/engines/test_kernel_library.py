@@ -1,4 +1,4 @@
-"""The library that the build makes: what is in it, and when it is not used."""
+"""Tests of the library of kernels that the build creates: its contents, and when it is not used."""
 
 from __future__ import annotations
 
@@ -38,10 +38,10 @@ def test_the_library_is_that_of_these_sources():
 
 @pytest.fixture
 def library(tmp_path, monkeypatch):
-    """A library beside a copy of the sources that it was made of."""
+    """Return the library with a copy of the sources from which it was built."""
     package = Path(kernel_library.PACKAGE)
     monkeypatch.setattr(kernel_library, "PACKAGE", tmp_path)
-    # Away from all that other folders could do to the results that are kept.
+    # Cached results of other folders must not have an effect here.
     monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path / "kept"))
     made = KernelLibrary(LIBRARY.path)
     for name in made.table["sources"]:
@@ -51,7 +51,7 @@ def library(tmp_path, monkeypatch):
 
 
 def edit(library, path):
-    """Append a comment to a file, and return the library as the next process sees it."""
+    """Append a comment to a file, and return the library as the next process loads it."""
     path.write_text(path.read_text("utf-8") + "\n# edited\n", "utf-8")
     return KernelLibrary(library.path)
 
@@ -69,7 +69,7 @@ def test_an_edited_law_is_not_taken_from_the_library(library, tmp_path, monkeypa
         pytest.skip("the sources have changed since the library was compiled: pip install -e .")
     edited = edit(library, tmp_path / "mechanics/kernels/dynamics.py")
     assert edited.changed_files == ["mechanics/kernels/dynamics.py"]
-    # Only a comment: every law is what it was.
+    # Only a comment was added: all laws are unchanged.
     assert edited.get_address("evaluate") is not None
     monkeypatch.setattr(kernel_library, "compute_digest", lambda function: "of an edited function")
     assert KernelLibrary(library.path).get_address("evaluate") is None
@@ -94,14 +94,14 @@ def test_the_next_process_computes_no_digest_again(library, tmp_path, monkeypatc
     monkeypatch.setattr(KernelLibrary, "has_changed", fail)
     later = KernelLibrary(library.path)
     assert (later.changed_files, later.get_address("evaluate")) == (edited.changed_files, address)
-    # Another edit makes all of it void.
+    # Another edit invalidates all cached results.
     with pytest.raises(AssertionError, match="computed again"):
         assert edit(library, tmp_path / "mechanics/kernels/dynamics.py").changed_files
 
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    """An empty folder of libraries."""
+    """Yield an empty folder of libraries."""
     monkeypatch.setattr(kernel_library, "LIBRARY_FOLDER", tmp_path)
     monkeypatch.setattr(kernel_library, "_problems", [])
     load_library.cache_clear()

@@ -1,4 +1,4 @@
-"""The same numbers whatever runs the kernels."""
+"""Tests that simulations have the same results with all sources of kernels."""
 
 from __future__ import annotations
 
@@ -26,7 +26,11 @@ print(walk.summary["versions"]["engine"], walk.values[-1].tobytes().hex(), sep="
 
 
 def run_by(source):
-    """Run the walk by one source of machine code; what ran it, and where the walker is at the end."""
+    """Run the walk with one source of machine code in a separate process.
+
+    Returns:
+        Name of the source, and the final state.
+    """
     environment = {**os.environ, "OSIMLITE_KERNELS": source}
     done = subprocess.run(
         [sys.executable, "-c", WALK], capture_output=True, text=True, env=environment, check=False

@@ -1,4 +1,4 @@
-"""Where the machine code of a law comes from, and what is said about it."""
+"""Tests of the selection among sources of machine code, and of the messages about it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from osimlite.simulation.engines import (
 
 
 class Library:
-    """A library that has one law."""
+    """Library that contains only the law `evaluate`."""
 
     path = "osimlite/native/kernels-baseline.so"
     changed_files: ClassVar[list[str]] = []
@@ -32,7 +32,7 @@ class Library:
 
 @pytest.fixture
 def sources(monkeypatch):
-    """No source of machine code at all, until a test adds one."""
+    """Yield a monkeypatch under which there is no source of machine code, until a test adds one."""
     monkeypatch.delenv(machine_code.VARIABLE, raising=False)
     monkeypatch.setattr(machine_code, "_addresses", {})
     monkeypatch.setattr(kernel_library, "load_library", lambda: None)
@@ -75,7 +75,7 @@ def test_a_file_of_an_earlier_compilation_comes_before_the_compiler(sources):
 def test_numba_compiles_without_a_compiler(sources):
     add_numba(sources)
     assert machine_code.get_address("evaluate") == 300
-    # It has no numbers that carry derivatives.
+    # Numba has no numbers that carry derivatives.
     assert machine_code.can_prepare(["merson"]) and not machine_code.can_prepare(["merson~16"])
 
 
@@ -111,7 +111,7 @@ def test_one_source_can_be_asked_for(sources, only, address):
 
 
 def test_no_compiler_is_looked_for_where_the_library_has_all(sources):
-    """To ask a compiler for its version takes longer than a short simulation."""
+    """Asking a compiler for its version takes longer than a short simulation."""
 
     def find():
         raise AssertionError("the compiler was asked for")
@@ -171,7 +171,7 @@ def test_python_takes_over_with_one_warning(sources, caplog):
 
 
 def test_one_edited_law_without_compiler_has_all_run_as_python(sources, caplog):
-    """Machine code calls laws by their addresses, which a law in Python has not."""
+    """Machine code calls laws by address, which a law in Python does not have."""
     add_library(sources)
     assert linking.MACHINE_CODE.select_for(["evaluate"]) is linking.MACHINE_CODE
     assert linking.MACHINE_CODE.select_for(["evaluate", "merson"]) is linking.PYTHON_CODE

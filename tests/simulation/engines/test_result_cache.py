@@ -1,4 +1,4 @@
-"""Results that processes keep for later ones."""
+"""Tests of results that processes cache for later processes."""
 
 from __future__ import annotations
 

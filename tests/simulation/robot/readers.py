@@ -1,4 +1,4 @@
-"""Two programs that did not write the URDF: what each makes of it."""
+"""Programs that read URDF files independently of the writer: PyBullet, yourdfpy and MuJoCo."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from osimlite.simulation.robot.robot import Robot, RobotLink, principal_axes
 
 
 class Bullet:
-    """A robot in PyBullet, damping and motors off, its joints and links by name."""
+    """Robot in PyBullet without damping and motors, with its joints and links by name."""
 
     def __init__(self, path: Path, client: int) -> None:
         import pybullet
@@ -53,10 +53,9 @@ class Bullet:
             )
 
     def inertial_frame(self, link: str) -> Array:
-        """Mass centre and principal axes of a link in the root (4, 4).
+        """Return mass centre and principal axes of a link in the root (4, 4).
 
-        Bullet keeps these in double precision; the link frames that it reports passed through
-        single precision.
+        Bullet keeps these in double precision; the link frames that it reports passed through single precision.
         """
         state = self.pb.getLinkState(
             self.body, self.links[link], computeForwardKinematics=1, physicsClientId=self.client
@@ -66,7 +65,7 @@ class Bullet:
         )
 
     def mass_matrix(self, names: list[str]) -> Array:
-        """Mass matrix for the joints in the order of `names`."""
+        """Return the mass matrix for the joints in the order of `names`."""
         moving = sorted(info[3] for info in self.joints.values() if info[3] >= 0)
         by_place = {info[3]: name for name, info in self.joints.items()}
         inside = [by_place[place] for place in moving]
@@ -83,11 +82,11 @@ class Bullet:
 
 @contextmanager
 def in_bullet(text: str, files: dict[str, bytes] | None = None) -> Iterator[Bullet]:
-    """Load URDF text into a PyBullet world of its own."""
+    """Load URDF text into a separate PyBullet world."""
     pybullet = pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
     client = pybullet.connect(pybullet.DIRECT)
     try:
-        # Bullet would otherwise remember the text of an earlier file of the same name.
+        # By default Bullet reuses the text of an earlier file with the same name.
         pybullet.setPhysicsEngineParameter(enableFileCaching=0, physicsClientId=client)
         with written(text, files) as path:
             yield Bullet(path, client)
@@ -107,12 +106,12 @@ def written(text: str, files: dict[str, bytes] | None = None) -> Iterator[Path]:
 
 
 def inertial_frame(link: RobotLink) -> Array:
-    """What Bullet calls the frame of a link, in the link frame."""
+    """Return Bullet's inertial frame of a link in the link frame."""
     return make_transform(principal_axes(link.inertia)[1], link.center)
 
 
 def yourdfpy_poses(text: str, values: dict[str, float]) -> dict[str, Array]:
-    """Pose of every link in the root (4, 4), by yourdfpy."""
+    """Return the pose of every link in the root (4, 4), by yourdfpy."""
     yourdfpy = pytest.importorskip("yourdfpy")
     with written(text) as path:
         reader = yourdfpy.URDF.load(str(path), load_meshes=False, build_scene_graph=True)
@@ -121,9 +120,17 @@ def yourdfpy_poses(text: str, values: dict[str, float]) -> dict[str, Array]:
 
 
 def mujoco_poses(text: str, values: dict[str, float]) -> tuple[dict[str, Array], float]:
-    """Pose of every link that moves in the root (4, 4), and the sum of their masses, by MuJoCo."""
+    """Read a URDF with MuJoCo.
+
+    Args:
+        text: the URDF.
+        values: positions of the joints.
+
+    Returns:
+        Pose of every moving link in the root (4, 4), and the sum of the masses.
+    """
     mujoco = pytest.importorskip("mujoco")
-    # MuJoCo makes one body of links that do not move relative to each other, unless told otherwise.
+    # By default MuJoCo merges links that do not move relative to each other.
     model = mujoco.MjModel.from_xml_string(
         text.replace("<compiler ", '<compiler fusestatic="false" ')
     )
@@ -137,7 +144,13 @@ def mujoco_poses(text: str, values: dict[str, float]) -> tuple[dict[str, Array],
 
 
 def worst_body(robot: Robot, poses: dict[str, Array], q: Array) -> float:
-    """Largest difference between the bodies' poses of the mechanism and those that follow from links' poses."""
+    """Return the largest difference between poses of bodies in the mechanism and poses from the robot's links.
+
+    Args:
+        robot: the robot.
+        poses: pose of each link.
+        q: coordinates of the mechanism.
+    """
     wanted = robot.mechanism.body_transforms(q)
     differences = [
         float(np.abs(poses[link.name] @ frame - wanted[body.name]).max())

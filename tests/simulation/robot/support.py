@@ -1,4 +1,4 @@
-"""Models, data and comparisons that several test modules of this package share."""
+"""Models for the tests of robots."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from osimlite.mechanics.multibody.spatial import make_offset
 
 
 def one_body(motions, count, *, child_frame=None, names=None, locked=()) -> Mechanism:
-    """Ground and a body B through one joint with `count` coordinates."""
+    """Return a mechanism of ground and a body B on a joint with `count` coordinates."""
     names = names or [f"q{k}" for k in range(count)]
     infos = tuple(
         CoordinateInfo(

@@ -1,4 +1,4 @@
-"""Functions that are straight lines, and what follows from it."""
+"""Tests of couplings by linear functions, which become mimic joints."""
 
 from __future__ import annotations
 

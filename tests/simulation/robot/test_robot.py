@@ -49,14 +49,14 @@ def test_links_carry_the_masses_of_the_bodies(case: Case):
 
 
 def _momenta(robot: Robot, case: Case):
-    """Mass, first and second moments about ground's origin: of the links, and of the bodies."""
+    """Return mass, first and second moments about ground's origin of the links, and those of the bodies."""
     placed, bodies = robot.link_transforms(case.q), case.mechanism.body_transforms(case.q)
     links = [
         (placed[link.name], link.mass, link.center, link.inertia)
         for link in robot.links
         if link.name != WORLD
     ]
-    # What is welded to ground has no mass in the merged robot.
+    # The merged robot has no mass of bodies that are welded to ground.
     parts = [
         (bodies[body.name], p.mass, p.center, p.inertia)
         for body in case.mechanism.bodies

@@ -1,4 +1,4 @@
-"""The text, as two other programs read it; a test of what would mislead them fails if its mend is taken out."""
+"""Tests of URDF text by two other programs; tests of corrections fail without the correction."""
 
 from __future__ import annotations
 
@@ -79,14 +79,14 @@ def test_mujoco_puts_the_bodies_where_the_mechanism_does(robot):
 def test_yourdfpy_agrees_on_any_mechanism(case: Case):
     robot = build_robot(case.mechanism)
     values = robot.joint_values(case.q)
-    # Joints that mimic another are moved by yourdfpy itself.
+    # yourdfpy moves joints that mimic another one itself.
     poses = yourdfpy_poses(urdf_text(robot), values)
     assert worst_body(robot, poses, case.q) < 1e-9
 
 
 @pytest.mark.parametrize("robot", robots(), ids=lambda robot: f"{robot.name}-{len(robot.links)}")
 def test_bullet_puts_masses_where_the_mechanism_does(robot):
-    """Also in planar joints, off the principal axes, and whatever numbers Bullet gives to joints."""
+    """Masses are right in planar joints and off the principal axes, whatever indices Bullet gives to joints."""
     q = state(robot)
     placed = robot.link_transforms(q)
     with in_bullet(urdf_text(robot)) as bullet:
@@ -98,11 +98,11 @@ def test_bullet_puts_masses_where_the_mechanism_does(robot):
 
 @pytest.mark.parametrize("robot", robots(), ids=lambda robot: f"{robot.name}-{len(robot.links)}")
 def test_bullet_has_the_mass_matrix_of_the_mechanism(robot):
-    """Massless links included, which Bullet would give 1 kg, and inertias that it would turn to 1e-6 only."""
+    """Bullet would give massless links 1 kg, and would find principal axes with an error of 1e-6."""
     q = state(robot)
     mechanism = robot.mechanism
     names = [joint.name for joint in robot.moving]
-    # Rates of the joints for each generalized speed.
+    # Rates of the joints per generalized speed.
     rates = np.linalg.inv(mechanism.rate_matrix(q))
     jacobian = robot.joint_jacobian(q)
     wanted = rates.T @ mechanism.mass_matrix(q) @ rates
@@ -113,7 +113,7 @@ def test_bullet_has_the_mass_matrix_of_the_mechanism(robot):
 
 
 def test_bullet_numbers_joints_in_an_order_of_its_own():
-    """So joints have to be found by name."""
+    """Joints must be found by name."""
     robot = build_robot(mixed_tree())
     with in_bullet(urdf_text(robot)) as bullet:
         assert list(bullet.joints) != [joint.name for joint in robot.joints]
@@ -121,7 +121,7 @@ def test_bullet_numbers_joints_in_an_order_of_its_own():
 
 
 def test_every_link_says_its_inertia():
-    """Bullet gives 1 kg to a link that says none."""
+    """Bullet gives 1 kg to a link without an inertia."""
     links = ElementTree.fromstring(urdf_text(build_robot(walker()))).findall("link")
     assert len(links) > 7
     for link in links:
@@ -131,10 +131,10 @@ def test_every_link_says_its_inertia():
 
 
 def test_nothing_stops_a_coordinate_at_its_range():
-    """With the range as limits Bullet pushes back, without it the motion is the mechanism's."""
+    """With the range as limits Bullet pushes back; without limits the motion is that of the mechanism."""
     mechanism = walker()
     q, u = mechanism.default_state()
-    # Both out of range and going further out.
+    # Both coordinates are out of range and move further out.
     for name, value, speed in (("Pelvis_tx", -0.5, -1.0), ("RKnee_rz", 0.5, 2.0)):
         q[mechanism.coordinate_index(name)], u[mechanism.coordinate_index(name)] = value, speed
     free = build_robot(mechanism)
@@ -143,7 +143,7 @@ def test_nothing_stops_a_coordinate_at_its_range():
 
 
 def _after_one_step(robot: Robot, q, u) -> float:
-    """Largest difference in rate between a step of Bullet and one with the mechanism's accelerations."""
+    """Return the largest difference in rates between a step of Bullet and a step by the mechanism's accelerations."""
     step, mechanism = 1e-3, robot.mechanism
     rates = {mechanism.coordinates[index].name: u[index] for index in robot.joint_of}
     with in_bullet(urdf_text(robot)) as bullet:
@@ -180,7 +180,7 @@ def test_sliding_joints_have_limits():
 
 
 def test_only_joints_of_one_axis_are_used():
-    """Bullet's planar and floating joints cannot be set."""
+    """Planar and floating joints of Bullet cannot be set."""
     kinds = [
         kind
         for robot in robots()
@@ -191,7 +191,7 @@ def test_only_joints_of_one_axis_are_used():
 
 
 def test_an_impossible_inertia_is_written_as_it_is():
-    """What Bullet makes of it (zero) is the reader's business; the text does not lie."""
+    """Bullet replaces such an inertia by zero; the text still states the value of the model."""
     mechanism = walker()
     body = mechanism.bodies[-1]
     strange = dataclasses.replace(body.mass_properties, inertia=np.diag((2.0, 0.002, 1.0)))
@@ -201,7 +201,7 @@ def test_an_impossible_inertia_is_written_as_it_is():
 
 
 def test_inertia_is_written_along_principal_axes():
-    """Bullet finds them to 1e-6 only."""
+    """Bullet finds principal axes with an error of 1e-6."""
     robot = build_robot(mixed_tree())
     inertias = list(ElementTree.fromstring(urdf_text(robot)).iter("inertia"))
     assert len(inertias) == len(robot.links)
@@ -210,7 +210,7 @@ def test_inertia_is_written_along_principal_axes():
 
 
 def test_no_line_is_too_long_for_bullet():
-    """A line of more than 8191 characters is broken where it happens to be."""
+    """Bullet breaks a line after 8191 characters, anywhere."""
     mechanism = walker()
     bodies = tuple(dataclasses.replace(body, name=body.name * 1500) for body in mechanism.bodies)
     robot = legal_names(build_robot(Mechanism("long", bodies, mechanism.coordinates)))
@@ -224,7 +224,7 @@ def test_no_line_is_too_long_for_bullet():
 
 
 def test_no_collision_shapes_are_written():
-    """Contact in OpenSim is a force between a few named surfaces; in other programs all shapes would collide."""
+    """In OpenSim a few named surfaces touch; in other programs all collision shapes would."""
     from osimlite.translate import to_urdf
 
     assert "<collision" not in to_urdf(dynamic_walker()).text

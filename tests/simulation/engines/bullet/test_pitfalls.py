@@ -1,7 +1,7 @@
-"""What Bullet does by default that is not mechanics, and that the engine mends it.
+"""Tests of settings that make Bullet compute correct mechanics in spite of its defaults.
 
-Every test shows both: that the result is right, and that it is wrong once the mend is taken out.
-What is mended in the URDF file is tested with the URDF writer.
+Every test shows both: the result is right, and it is wrong without the correction. Corrections in the URDF file are
+tested with the URDF writer.
 """
 
 from __future__ import annotations
@@ -38,7 +38,14 @@ def mechanism(walker):
 
 
 def error(mechanism, route="articulated-body", *, q=Q, u=U):
-    """Largest error of an acceleration against our own recursion, relative to the largest acceleration."""
+    """Return the largest error of accelerations, relative to the largest acceleration by osimlite's recursion.
+
+    Args:
+        mechanism: the mechanism.
+        route: Bullet's method for accelerations.
+        q: coordinates.
+        u: speeds.
+    """
     expected = mechanism.acceleration(q, u)
     with BulletEngine(mechanism, Forces(()), route=route) as engine:
         return (
@@ -67,7 +74,7 @@ def test_inertia_is_that_of_the_file(mechanism, monkeypatch, route):
 
 
 def test_ranges_are_no_limits(walker):
-    """The knee leaves its range in OpenSim, and here."""
+    """The knee leaves its range in OpenSim too."""
     knee = next(item for item in walker.components(Coordinate) if item.name == "RKnee_rz")
     trajectory = osimlite.simulate(walker, fixed_step=1e-3)
     assert (
@@ -91,7 +98,7 @@ def test_fast_joints_are_not_clipped(monkeypatch):
 
 
 def impossible_inertia():
-    """A shank as published models have it: one moment is larger than the sum of the others."""
+    """Return bodies like some in published models: one moment of inertia exceeds the sum of the others."""
     model = Model(name="impossible")
     carrier = model.ground
     for number in range(2):
@@ -111,7 +118,7 @@ def test_an_inertia_that_no_body_has_is_kept(monkeypatch, capfd):
     state = {"q": [0.1, 0.2, 0.3, -0.4, 0.5, 0.6], "u": [1.0, -1.0, 0.5, 2.0, 1.0, -0.5]}
     for route in ROUTES:
         assert error(mechanism, route, **state) < 1e-10
-    # Nor does Bullet complain, since it never sees it.
+    # Bullet prints no warning either, because it never sees these inertias.
     assert capfd.readouterr() == ("", "")
     with monkeypatch.context() as without:
         without.setattr(World, "set_inertias", lambda *_: None)
@@ -121,12 +128,21 @@ def test_an_inertia_that_no_body_has_is_kept(monkeypatch, capfd):
         assert error(mechanism, "mass-matrix", **state) > 1e-3
     monkeypatch.setattr(bullet_world, "compute_inertia_excess", lambda link: 0.0)
     assert error(mechanism, "articulated-body", **state) > 1e-3
-    # Bullet's own complaint stays in the buffer of the C library until then.
+    # Bullet's warning remains in the buffer of the C library until this call.
     capfd.readouterr()
 
 
 def steps(walker, h=1e-3, to=0.3):
-    """States by Bullet's own steps, and the same method by the engine's accelerations."""
+    """Compute a motion of the walker with fixed steps.
+
+    Args:
+        walker: the model.
+        h: step (s).
+        to: end time (s).
+
+    Returns:
+        States by Bullet's steps, and by semi-implicit Euler with the engine's accelerations.
+    """
     mechanism = build_mechanism(walker)
     with BulletEngine(mechanism, force_elements(walker, mechanism)) as engine:
         y = engine.state.pack(Q, U)
@@ -137,7 +153,7 @@ def steps(walker, h=1e-3, to=0.3):
 
 
 def test_forces_belong_to_the_state_and_act_once(walker, monkeypatch):
-    """A step is exactly semi-implicit Euler with the forces at its start: no stale places, no force twice."""
+    """A step is exactly semi-implicit Euler with the forces at its start: positions are current, forces act once."""
     ours, expected = steps(walker)
     assert ours == pytest.approx(expected, abs=1e-9)
     plain = World.step
@@ -152,7 +168,7 @@ def test_forces_belong_to_the_state_and_act_once(walker, monkeypatch):
 
 
 def test_stale_places_would_show(walker, monkeypatch):
-    """With forces one step old, as Bullet's own link positions are, the motion differs."""
+    """Forces that are one step old, as from Bullet's own link positions, change the motion."""
     plain = World.step
     held = []
 
@@ -211,7 +227,7 @@ def test_nothing_collides(mechanism):
 
 
 def test_worlds_are_left(mechanism):
-    # Engines that earlier tests left open are closed when they are collected: not during this test.
+    # Collect engines of earlier tests now, because collecting them during this test would change the count.
     gc.collect()
     before = bullet.getConnectionInfo(0)["isConnected"]
     for _ in range(30):
@@ -225,7 +241,7 @@ def test_bodies_can_be_seen(walker, mechanism):
 
     with BulletEngine(mechanism, Forces(()), visuals=collect_visuals(walker, mechanism)) as engine:
         shapes = bullet.getVisualShapeData(engine.world.id, physicsClientId=engine.world.client)
-        # Platform, pelvis, two thighs and two shanks.
+        # The six bodies are the platform, the pelvis, two thighs and two shanks.
         assert len(shapes) == 6
         assert (
             np.abs(

@@ -1,4 +1,4 @@
-"""Bullet's window, with a world that nobody sees in its place: what is shown when, and for how long."""
+"""Tests of the timing of Bullet's window, with a world that is not displayed: which pose is drawn when."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from osimlite.simulation.run import Simulation
 
 
 class Clock:
-    """Time that passes when somebody waits, and a little with every look at it."""
+    """Clock that advances when the code sleeps, and a little with every reading."""
 
     def __init__(self) -> None:
         self.now = 0.0
@@ -38,7 +38,7 @@ def clock(monkeypatch):
 
 @pytest.fixture
 def keys(monkeypatch):
-    """What is pressed at each look at the keyboard, the first first; then nothing."""
+    """Return a list of the sets of keys that successive readings of the keyboard return; no keys afterwards."""
     pressed: list[set[int]] = []
     monkeypatch.setattr(
         module.Window, "read_pressed_keys", lambda self: pressed.pop(0) if pressed else set()
@@ -48,7 +48,7 @@ def keys(monkeypatch):
 
 @pytest.fixture
 def drawn(clock, monkeypatch):
-    """When which pose was drawn."""
+    """Return a list of times and poses that the window draws."""
     poses: list[tuple[float, list[float]]] = []
     real = module.Window.draw
 
@@ -88,7 +88,7 @@ def test_space_stops_and_goes_on(clock, keys, drawn):
     simulation, _ = _shown()
     simulation.close()
     assert clock.now == pytest.approx(0.5 + 121 / 60, abs=0.03)
-    # What stood still is made up for by no haste.
+    # After a pause, the motion continues at its normal speed.
     gaps = [after - before for (before, _), (after, _) in pairwise(drawn)]
     assert sorted(gaps)[-2] < 0.02 and min(gaps) > 0.01
 
