@@ -75,9 +75,7 @@ def table(fixtures):
 
 
 def test_table_forces_and_energies(table):
-    """Errors of forces and moments are relative to the largest component of the vector, those of energies to the
-    energy.
-    """
+    """Tolerances are relative: to the largest component of a force or moment, and to the energy."""
     assert len(table) == 2232
     touching = 0
     for row in table:

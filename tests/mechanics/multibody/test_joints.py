@@ -176,9 +176,7 @@ def test_bias_and_rate_bias_are_derivatives(joint_type, seed, turned_round):
 
 
 def test_a_rod_that_bends_evenly_is_an_arc():
-    """The arc has the length of the rod, begins along Y, and ends along the child's Y axis; without bending it is
-    straight.
-    """
+    """The arc has the length of the rod, and ends along the child's Y axis; a rod that is not bent is straight."""
     length, q = 0.7, np.array((0.6, -0.9, 0.3))
     motions = constant_curvature(length, (0.1, 0.2, -0.3))
     rod = alone(Mobilizer("/j", "ConstantCurvatureJoint", motions, (0, 1, 2)))
