@@ -206,7 +206,7 @@ class _KernelRewriter(Kernel, ast.NodeTransformer):
         # A variable that only one side assigns must exist on the other side, too.
         clear = [
             ast.Assign([_store_name(name)], _load_name("unset_"))
-            for name in sorted(self.branch_variables - set(self.given))
+            for name in sorted(self.branch_variables - set(self.argument_names))
         ]
         tree.body = [*clear, *body]
         tree.returns = None

@@ -191,15 +191,15 @@ class _JavaScriptWriter(Kernel):
         self.functions: list[Function] = []
         self.records: list[Any] = []
         self._temporaries = 0
-        self._locals = frozenset((*self.given, *self.own))
+        self._locals = frozenset((*self.argument_names, *self.local_names))
 
     def write(self) -> str:
         """Return the text of the function."""
         lines = self.block(self.body)
-        names = [*map(_escape_name, self.own), *(f"${k}" for k in range(self._temporaries))]
+        names = [*map(_escape_name, self.local_names), *(f"${k}" for k in range(self._temporaries))]
         declared = [f"let {', '.join(names)};"] if names else []
         defaults = self.function.__defaults__ or ()
-        parameters = [_escape_name(name) for name in self.given]
+        parameters = [_escape_name(name) for name in self.argument_names]
         for k, value in enumerate(reversed(defaults), 1):
             parameters[-k] += f" = {_format_number(value)}"
         header = f"function {self.name}({', '.join(parameters)}) {{"

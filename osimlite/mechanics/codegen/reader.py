@@ -34,7 +34,7 @@ class Kernel:
         function: function of the package.
         tree: syntax tree of the function.
         body: statements of the function without the docstring.
-        given: names of the arguments of the function.
+        argument_names: names of the arguments of the function.
 
     Args:
         function: function of the package.
@@ -45,16 +45,16 @@ class Kernel:
         tree = self.parse(function)
         self.function, self.tree, self.language = function, tree, language
         self.body = tree.body[1:] if ast.get_docstring(tree) else tree.body
-        self.given = [argument.arg for argument in tree.args.args]
+        self.argument_names = [argument.arg for argument in tree.args.args]
 
     def parse(self, function: Function) -> ast.FunctionDef:
         """Return the syntax tree of a function, which all kernels of the function share."""
         return find_tree(function)
 
     @cached_property
-    def own(self) -> list[str]:
+    def local_names(self) -> list[str]:
         """Names of its local variables besides arguments, by their first appearance."""
-        return [name for name in list_assigned_names(self.tree) if name not in self.given]
+        return [name for name in list_assigned_names(self.tree) if name not in self.argument_names]
 
     @property
     def name(self) -> str:

@@ -383,14 +383,14 @@ class ExpressionWriter:
         are_integers = all(map(is_integral, kinds))
         if type(op) in FUNCTIONS:
             # The functions of the header have an overload for integers and one for floats.
-            is_whole = are_integers and not (
+            is_integer = are_integers and not (
                 isinstance(op, ast.Pow) and self.function.is_negative(right_of(node))
             )
             if is_integral(kinds[0]):
-                one = f"static_cast<{'int64_t' if is_whole else 'double'}>({one})"
+                one = f"static_cast<{'int64_t' if is_integer else 'double'}>({one})"
             if is_integral(kinds[1]):
                 # A power by an integer is a product of factors, whatever the base is.
-                two = f"static_cast<{'int64_t' if is_whole or isinstance(op, ast.Pow) else 'double'}>({two})"
+                two = f"static_cast<{'int64_t' if is_integer or isinstance(op, ast.Pow) else 'double'}>({two})"
             return ExpressionText(f"py::{FUNCTIONS[type(op)]}({one}, {two})")
         # C++ leaves the behaviour of signed overflow undefined: generators of random numbers
         # multiply by a function of the header.
@@ -494,11 +494,12 @@ class ExpressionWriter:
         test = self.condition(node.test)
         question = test.text if test.precedence > CHOICE else f"({test.text})"
         first, second = (
-            self.guard_expression(self._chosen, part, kind) for part in (node.body, node.orelse)
+            self.guard_expression(self._write_branch, part, kind)
+            for part in (node.body, node.orelse)
         )
         return ExpressionText(f"{question} ? {first} : {second}", CHOICE)
 
-    def _chosen(self, node: ast.expr, kind: Type) -> str:
+    def _write_branch(self, node: ast.expr, kind: Type) -> str:
         have = self.function.require_type(node)
         if have is not kind and is_number(kind):
             return self.cast(self.text(node), have, kind)
@@ -567,7 +568,7 @@ class ExpressionWriter:
             texts += [
                 self.constant(f"{function.__name__}_default", value).text for value in defaults
             ]
-            called = self.function.specialise(function, complete)
+            callee = self.function.specialise(function, complete)
             # Functions as arguments are part of the specialisation.
             argument_texts = [
                 text
@@ -575,7 +576,7 @@ class ExpressionWriter:
                 if not isinstance(kind, Callee)
             ]
             return ExpressionText(
-                f"{self.names.name_function(called)}({', '.join(argument_texts)})"
+                f"{self.names.name_function(callee)}({', '.join(argument_texts)})"
             )
         raise self.function.refuse(node)
 

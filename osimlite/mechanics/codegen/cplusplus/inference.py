@@ -68,7 +68,7 @@ class Specialisation(Kernel):
         super().__init__(function, "C++")
         self.specialise = specialise
         self.arguments = tuple(arguments)
-        if len(self.arguments) != len(self.given):
+        if len(self.arguments) != len(self.argument_names):
             raise self.refuse(self.tree.args, f"called with {len(self.arguments)} arguments")
         for node in (
             self.tree.args.kwonlyargs,
@@ -78,10 +78,12 @@ class Specialisation(Kernel):
         ):
             if node:
                 raise self.refuse(self.tree.args)
-        self.variables: dict[str, Type | None] = dict(zip(self.given, arguments, strict=True))
+        self.variables: dict[str, Type | None] = dict(
+            zip(self.argument_names, arguments, strict=True)
+        )
         self.result: Type | None = None
         self.effects = 0
-        self._locals = frozenset((*self.given, *self.own))
+        self._locals = frozenset((*self.argument_names, *self.local_names))
         self._types: dict[ast.expr, Type | None] = {}
         self._effects: dict[ast.AST, int] = {}
         self._infer()
@@ -346,9 +348,9 @@ class Specialisation(Kernel):
         if isinstance(function, FunctionType) and function not in INTRINSICS:
             if kinds is None:
                 return None
-            called = self.specialise(function, self.complete_arguments(function, kinds))
-            self.effects |= called.effects
-            return called.result
+            callee = self.specialise(function, self.complete_arguments(function, kinds))
+            self.effects |= callee.effects
+            return callee.result
         if is_record_class(function):
             if kinds is None:
                 return None
@@ -448,8 +450,8 @@ class Specialisation(Kernel):
                 result += kind.parts if isinstance(kind, Tuple) else [None]
             else:
                 result.append(self.type_of(node))
-        known = tuple(kind for kind in result if kind is not None)
-        return known if len(known) == len(result) else None
+        types = tuple(kind for kind in result if kind is not None)
+        return types if len(types) == len(result) else None
 
     @staticmethod
     def complete_arguments(function: FunctionType, kinds: tuple[Type, ...]) -> tuple[Type, ...]:
@@ -464,8 +466,8 @@ class Specialisation(Kernel):
         Returns:
             One type per parameter.
         """
-        rest = function.__code__.co_argcount - len(kinds)
-        defaults = (function.__defaults__ or ())[-rest:] if rest > 0 else ()
+        missing_count = function.__code__.co_argcount - len(kinds)
+        defaults = (function.__defaults__ or ())[-missing_count:] if missing_count > 0 else ()
         return kinds + tuple(kind for kind in map(type_of_constant, defaults) if kind is not None)
 
     @staticmethod
@@ -479,10 +481,10 @@ class Specialisation(Kernel):
         Returns:
             One type per field.
         """
-        rest = record._fields[len(kinds) :]
+        missing_fields = record._fields[len(kinds) :]
         defaults = [
             type_of_constant(record._field_defaults[name])
-            for name in rest
+            for name in missing_fields
             if name in record._field_defaults
         ]
         return kinds + tuple(kind for kind in defaults if kind is not None)

@@ -53,7 +53,7 @@ class Library:
         constants: definitions of constants.
         functions: text of each function, by name.
         exports: text of each exported function, by symbol.
-        called: names of the functions that each function or exported symbol calls.
+        callees: names of the functions that each function or exported symbol calls.
     """
 
     def __init__(self) -> None:
@@ -62,13 +62,13 @@ class Library:
         self._function_names: dict[Specialisation, str] = {}
         self._type_names: dict[Type, str] = {}
         self._constant_names: dict[tuple[str, str], str] = {}
-        self._taken: set[str] = set()
+        self._used_names: set[str] = set()
         self.structs: list[str] = []
         self.constants: list[str] = []
         self.functions: dict[str, str] = {}
         """Texts of the functions by name; called functions come before those that call them."""
         self.exports: dict[str, str] = {}
-        self.called: dict[str, set[str]] = {}
+        self.callees: dict[str, set[str]] = {}
         """Names of the functions that each function or exported symbol calls."""
         self._writing: list[str] = []
 
@@ -100,7 +100,7 @@ class Library:
             ]
             specialisation = self.specialise(function, kinds)
             self._writing.append(symbol)
-            self.called[symbol] = set()
+            self.callees[symbol] = set()
             name = self.name_function(specialisation)
             self._writing.pop()
         except TranslationError as error:
@@ -108,10 +108,10 @@ class Library:
             raise TranslationError(message, file=error.file, line=error.line) from None
         assert specialisation.result is not None
         parameters = ", ".join(
-            f"{self.name_type(kind)} {escape_name(given)}"
-            for given, kind in zip(specialisation.given, kinds, strict=True)
+            f"{self.name_type(kind)} {escape_name(argument)}"
+            for argument, kind in zip(specialisation.argument_names, kinds, strict=True)
         )
-        call = f"{name}({', '.join(map(escape_name, specialisation.given))})"
+        call = f"{name}({', '.join(map(escape_name, specialisation.argument_names))})"
         # Callers read an integer of eight bytes, and a truth value would fill one of them.
         result = INTEGER if specialisation.result is BOOLEAN else specialisation.result
         head = f"OSIMLITE_EXPORT {self.name_type(result)} {symbol}({parameters})"
@@ -153,14 +153,14 @@ class Library:
                 self._open.discard(key)
         return self._specialisations[key]
 
-    def _free(self, name: str) -> str:
-        free = escape_name(name)
+    def _make_unique_name(self, name: str) -> str:
+        unique_name = escape_name(name)
         number = 1
-        while free in self._taken:
+        while unique_name in self._used_names:
             number += 1
-            free = f"{name}_{number}"
-        self._taken.add(free)
-        return free
+            unique_name = f"{name}_{number}"
+        self._used_names.add(unique_name)
+        return unique_name
 
     # ---------------------------------------------------------------------------------------------------- names
     def name_function(self, function: Specialisation) -> str:
@@ -171,14 +171,14 @@ class Library:
         if function not in self._function_names:
             # The name is registered before the text is written, so that it is free for no other
             # function.
-            name = self._function_names[function] = self._free(function.name)
-            self.called[name] = set()
+            name = self._function_names[function] = self._make_unique_name(function.name)
+            self.callees[name] = set()
             self._writing.append(name)
             text = FunctionWriter(function, self).write(name)
             self._writing.pop()
             self.functions[name] = f"{self._comment(function)}\n{text}"
         if self._writing:
-            self.called[self._writing[-1]].add(self._function_names[function])
+            self.callees[self._writing[-1]].add(self._function_names[function])
         return self._function_names[function]
 
     @staticmethod
@@ -202,10 +202,10 @@ class Library:
         if kind.is_array:
             return f"Array<{parts[0]}, {len(parts)}>"
         if kind.record is not None:
-            name = self._free(kind.record.__name__)
+            name = self._make_unique_name(kind.record.__name__)
             fields = [escape_name(field) for field in kind.record._fields]
         else:
-            name = self._free(
+            name = self._make_unique_name(
                 "Tuple_" + "_".join(re.sub(r"\W+", "", part.replace("*", "s")) for part in parts)
             )
             fields = [f"item{index}" for index in range(len(parts))]
@@ -225,7 +225,7 @@ class Library:
         # One name may stand for different tuples in different modules.
         key = name, repr(value)
         if key not in self._constant_names:
-            free = self._constant_names[key] = self._free(name)
+            free = self._constant_names[key] = self._make_unique_name(name)
             self.constants.append(
                 f"OSIMLITE_CONSTANT {self.name_type(kind)} {free} = {self._constant_text(value, kind)};"
             )
@@ -263,13 +263,13 @@ class Library:
     def reach(self, symbols: Sequence[str]) -> set[str]:
         """Return the names of all functions that exported functions need."""
         pending = list(symbols)
-        seen = set()
+        reached = set()
         while pending:
-            for name in self.called[pending.pop()]:
-                if name not in seen:
-                    seen.add(name)
+            for name in self.callees[pending.pop()]:
+                if name not in reached:
+                    reached.add(name)
                     pending.append(name)
-        return seen
+        return reached
 
 
 def write_library(kernels: Kernels) -> str:

@@ -34,7 +34,7 @@ class FunctionWriter(ExpressionWriter):
 
     def __init__(self, function: Specialisation, names: Names) -> None:
         super().__init__(function, names)
-        self._places = place_variables(function.function)
+        self._scopes = find_variable_scopes(function.function)
 
     def write(self, name: str) -> str:
         """Return the text of the function.
@@ -44,7 +44,7 @@ class FunctionWriter(ExpressionWriter):
         """
         function = self.function
         copies, parameters = [], []
-        for parameter, kind in zip(function.given, function.arguments, strict=True):
+        for parameter, kind in zip(function.argument_names, function.arguments, strict=True):
             variable_type = function.variables[parameter]
             if isinstance(kind, Callee) or variable_type is None:
                 continue
@@ -59,7 +59,7 @@ class FunctionWriter(ExpressionWriter):
                 copies[-1:-1] = self._take_pending()
         outer = [
             f"{self.names.name_type(outer_type)} {self.local(variable)};"
-            for variable in self._places.outer
+            for variable in self._scopes.outer
             if (outer_type := function.variables[variable]) is not None
             and not isinstance(outer_type, Callee)
         ]
@@ -156,10 +156,10 @@ class FunctionWriter(ExpressionWriter):
             iterated: expression that the loop iterates over: a call of range() or a tuple.
             body: statements in the loop.
         """
-        is_own = name == "_" or name in self._places.loop_variables.get(node, ())
+        is_local = name == "_" or name in self._scopes.loop_variables.get(node, ())
         # A variable that is used after the loop, or assigned in it, needs a counter besides.
-        counter = self.new_name("index") if name == "_" or not is_own else self.local(name)
-        store = [] if is_own else [f"{INDENT}{self.local(name)} = {counter};"]
+        counter = self.new_name("index") if name == "_" or not is_local else self.local(name)
+        store = [] if is_local else [f"{INDENT}{self.local(name)} = {counter};"]
         if self.function.is_range(iterated):
             assert isinstance(iterated, ast.Call)
             head = self._range_head(counter, iterated.args, iterated)
@@ -353,12 +353,12 @@ class FunctionWriter(ExpressionWriter):
             node: the assignment.
             name: name of the variable.
         """
-        if self._places.definitions.get(name) is not node:
+        if self._scopes.definitions.get(name) is not node:
             return ""
         kind = self.function.variables[name]
         assert kind is not None
         constant = (
-            "const " if name in self._places.constants and not isinstance(kind, Pointer) else ""
+            "const " if name in self._scopes.constants and not isinstance(kind, Pointer) else ""
         )
         return f"{constant}{self.names.name_type(kind)} "
 
@@ -376,22 +376,24 @@ class FunctionWriter(ExpressionWriter):
         kinds = [self.function.require_type(to_load(target)), self.function.require_type(value)]
         is_written = bool(self.function.effects_of(value) & WRITES)
         if isinstance(target, ast.Subscript):
-            place = f"{self.text(target.value)}[{self._store_index(target.slice, is_written)}]"
+            target_text = (
+                f"{self.text(target.value)}[{self._store_index(target.slice, is_written)}]"
+            )
         else:
-            place = self.text(target)
+            target_text = self.text(target)
         # Python reads the target before it evaluates the right side, which may change it.
         before = (
-            self.hold(kinds[0], place)
+            self.hold(kinds[0], target_text)
             if is_written and isinstance(target, ast.Subscript)
-            else place
+            else target_text
         )
         is_direct = type(op) in OPERATORS and not (
             isinstance(op, ast.Div) and all(map(is_integral, kinds))
         )
-        if is_direct and before == place:
-            return [f"{place} {OPERATORS[type(op)][0]}= {self.text(value)};"]
+        if is_direct and before == target_text:
+            return [f"{target_text} {OPERATORS[type(op)][0]}= {self.text(value)};"]
         texts = [before, self._operand(value, op, is_right=True)]
-        return [f"{place} = {self.operation(texts, op, kinds, node).text};"]
+        return [f"{target_text} = {self.operation(texts, op, kinds, node).text};"]
 
     def _store_index(self, node: ast.expr, is_written: bool) -> str:
         text = self.text(node)
@@ -400,7 +402,7 @@ class FunctionWriter(ExpressionWriter):
         return text
 
 
-class VariablePlaces:
+class VariableScopes:
     """Position of the definition of each variable of a function.
 
     A variable is defined by the assignment to it, by its loop, or before all statements.
@@ -424,7 +426,7 @@ class VariablePlaces:
                     stores[node.id] = stores.get(node.id, 0) + 1
         # A variable with a single assignment may be constant in C++.
         self.constants = {name for name, count in stores.items() if count == 1}
-        self._place(function.body, [name for name in function.own if name != "_"])
+        self._find_scopes(function.body, [name for name in function.local_names if name != "_"])
 
     def _find_used_names(self, node: ast.AST) -> set[str]:
         """Return the names of all variables in a part of the function."""
@@ -433,7 +435,7 @@ class VariablePlaces:
             self._names[node] = names.union(*map(self._find_used_names, ast.iter_child_nodes(node)))
         return self._names[node]
 
-    def _place(self, body: Sequence[ast.stmt], names: Sequence[str]) -> None:
+    def _find_scopes(self, body: Sequence[ast.stmt], names: Sequence[str]) -> None:
         """Find the position of variables that are used in one block only.
 
         Args:
@@ -443,7 +445,7 @@ class VariablePlaces:
         for name in names:
             users = [statement for statement in body if name in self._find_used_names(statement)]
             first = users[0]
-            if len(users) == 1 and self._place_within(first, name):
+            if len(users) == 1 and self._find_scope_within(first, name):
                 continue
             if self._defines(first, name):
                 self.definitions[name] = first
@@ -452,7 +454,7 @@ class VariablePlaces:
                 # another.
                 self.outer.append(name)
 
-    def _place_within(self, node: ast.stmt, name: str) -> bool:
+    def _find_scope_within(self, node: ast.stmt, name: str) -> bool:
         """Find the position of a variable that is used in one compound statement only.
 
         Args:
@@ -494,7 +496,7 @@ class VariablePlaces:
         ]
         if len(users) != 1:
             return False
-        self._place(users[0], [name])
+        self._find_scopes(users[0], [name])
         return True
 
     def _defines(self, node: ast.stmt, name: str) -> bool:
@@ -512,9 +514,9 @@ class VariablePlaces:
 
 
 @cache
-def place_variables(function: Function) -> VariablePlaces:
+def find_variable_scopes(function: Function) -> VariableScopes:
     """Return the positions of the definitions of all variables of a function."""
-    return VariablePlaces(Kernel(function, "C++"))
+    return VariableScopes(Kernel(function, "C++"))
 
 
 @cache

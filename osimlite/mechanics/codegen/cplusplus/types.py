@@ -189,7 +189,7 @@ def type_of_constant(value: Any) -> Type | None:
         return callee(value)
     if isinstance(value, tuple):
         parts = [type_of_constant(part) for part in value]
-        known = [part for part in parts if part is not None and not isinstance(part, Callee)]
+        part_types = [part for part in parts if part is not None and not isinstance(part, Callee)]
         record = type(value) if type(value) is not tuple else None
-        return tuple_of(known, record) if len(known) == len(parts) else None
+        return tuple_of(part_types, record) if len(part_types) == len(parts) else None
     return None
