@@ -18,7 +18,7 @@ from osimlite.fitting.pose_layout import (
     separate_couplers,
 )
 from osimlite.mechanics.kernels.pointers import Floats, Ints
-from osimlite.mechanics.kernels.pose_fit import APART, STUCK, UNSEEN
+from osimlite.mechanics.kernels.pose_fit import STUCK, UNASSEMBLED, UNSEEN
 from osimlite.mechanics.kernels.pose_record import FIT
 from osimlite.mechanics.multibody.constraints import Lock, PrescribedCoordinate
 from osimlite.mechanics.multibody.functions import SmoothFunction
@@ -175,8 +175,8 @@ class PoseFit:
             # The workspace carries the last poses from call to call.
             self.bind_arrays(frames[rows], result[rows])(rows.stop - rows.start)
         status = result[:, -1]
-        if (status == APART).any():
-            raise self.create_constraint_error(int(np.argmax(status == APART)))
+        if (status == UNASSEMBLED).any():
+            raise self.create_constraint_error(int(np.argmax(status == UNASSEMBLED)))
         values = np.tile(self.mechanism.values({}), (count, 1))
         values[:, self.order] = result[:, :free_count]
         vectors = result[:, free_count:-3].reshape(count, -1, 3)
@@ -275,7 +275,7 @@ class SingleFrameFit:
         self._measured_values[:] = measured
         self._fit.fill_prescribed(self._row[None], np.array((time,)))
         self._run(1)
-        if self._result[-1] == APART:
+        if self._result[-1] == UNASSEMBLED:
             raise self._fit.create_constraint_error(0)
         values = self._values.copy()
         values[self._fit.order] = self._q

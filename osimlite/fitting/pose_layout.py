@@ -142,7 +142,10 @@ class FitLayout:
             [placements.freedom(goal.coordinate) for goal in goals],
         )
         self._append_list(
-            ints, FIT.HELD, FIT.HELD_AT, [placements.freedom(index) for index in input_coordinates]
+            ints,
+            FIT.PRESCRIBED,
+            FIT.PRESCRIBED_AT,
+            [placements.freedom(index) for index in input_coordinates],
         )
         ints[FIT.RANGES_AT] = len(numbers)
         for lower, upper in compute_ranges(system.mechanism, system.order, couplers):
@@ -163,7 +166,9 @@ class FitLayout:
         self._append_list(ints, FIT.COUPLERS, FIT.COUPLER_AT, records)
         self._append_axes(ints, structure, system.numbers, links)
         ints[FIT.RESOLVED_AT] = len(ints)
-        freedom_types = dict.fromkeys(map(placements.freedom, input_coordinates), FREEDOM.GIVEN)
+        freedom_types = dict.fromkeys(
+            map(placements.freedom, input_coordinates), FREEDOM.PRESCRIBED
+        )
         freedom_types |= {
             placements.freedom(coupler_with_record.dependent): FREEDOM.DEPENDENT
             for coupler_with_record in couplers
@@ -181,7 +186,7 @@ class FitLayout:
             FIT.SLOPE: size,
             FIT.STIFFNESS: size * size,
             FIT.BEND: size * size,
-            FIT.TURNED: 9 * links,
+            FIT.MOMENTS: 9 * links,
             FIT.ROWS: equations * size,
             FIT.ERRORS: equations,
             FIT.WORKSPACE: max(

@@ -21,7 +21,7 @@ from osimlite.errors import SettingError
 from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.kernels.pointers import Floats, Ints
 from osimlite.mechanics.kernels.reflexes import LEG_STATE, REFLEXES
-from osimlite.mechanics.kernels.sensors import SENSES
+from osimlite.mechanics.kernels.sensors import SENSOR_PLAN
 from osimlite.mechanics.kernels.walks import LEGS, PROGRESS
 from osimlite.mechanics.multibody.functions import ConstantValue, PiecewiseConstant, SmoothFunction
 from osimlite.simulation.run_controls import find_constant_offsets
@@ -253,7 +253,9 @@ class ControllerRuns:
         plan = first_controller.plan.copy()
         sensor_plan = first_controller.sensor_plan
         # All runs use the memory of the longest delay.
-        plan[REFLEXES.KEPT] = max(controller.plan[REFLEXES.KEPT] for controller in controllers)
+        plan[REFLEXES.HISTORY_LENGTH] = max(
+            controller.plan[REFLEXES.HISTORY_LENGTH] for controller in controllers
+        )
         plan[REFLEXES.MEMORY_SIZE] = max(
             controller.plan[REFLEXES.MEMORY_SIZE] for controller in controllers
         )
@@ -261,7 +263,7 @@ class ControllerRuns:
             [controls.names.index(path) for path in first_controller.paths]
         ]
         self._memory = np.zeros((count, plan[REFLEXES.MEMORY_SIZE]))
-        rows = np.zeros((count, sensor_plan[SENSES.SIZE]))
+        rows = np.zeros((count, sensor_plan[SENSOR_PLAN.SIZE]))
         # UNKNOWN lets the first sensors decide the state of a leg; legs without states keep 0.
         self._memory[:, :LEGS] = (
             LEG_STATE.UNKNOWN if plan[REFLEXES.HAS_STATES] else LEG_STATE.EARLY_STANCE
@@ -289,7 +291,7 @@ class ControllerRuns:
             earlier_record: record of the earlier run.
         """
         frame_count = self.controller.count_steps(earlier_record.times[-1]) + 1
-        history_size = int(plan[REFLEXES.KEPT])
+        history_size = int(plan[REFLEXES.HISTORY_LENGTH])
         sensor_count = len(self.controller.sensors)
         history = self._memory[0, LEGS : LEGS + history_size * sensor_count].reshape(
             history_size, sensor_count
@@ -326,7 +328,7 @@ class ControllerRuns:
         )
         rows = self._record[:new_count].copy()
         if self._before is not None:
-            history_size = int(self._plan[REFLEXES.KEPT])
+            history_size = int(self._plan[REFLEXES.HISTORY_LENGTH])
             times = np.concatenate([self._before.times[-history_size:], times])
             rows = np.concatenate([self._before.rows[-history_size:], rows])
         count = int(

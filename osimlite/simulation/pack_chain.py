@@ -158,7 +158,7 @@ def _list_products(packer: Packer, shares: Sequence[tuple[int, int]], count: int
             for row_share, i in shares_of_freedom[freedom]:
                 for column_share, j in shares_of_freedom[ancestor]:
                     result += PRODUCT.record(
-                        ONE=row_share, TWO=column_share, ENTRY=count * i + j, PLACE=entry
+                        ONE=row_share, TWO=column_share, ENTRY=count * i + j, TARGET=entry
                     )
             entry = entry + 1
             ancestor = freedoms[DOF.SIZE * ancestor + DOF.ABOVE]

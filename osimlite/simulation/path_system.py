@@ -143,7 +143,8 @@ class PathSystem(System):
                 ].astype(int)
                 work = record[PATH_WORK.ORDER + len(route.points) + 2 * len(route.surfaces) :]
                 result[name] = [
-                    (int(k), work[NODE_WORK.SIZE * k + NODE_WORK.PLACE :][:3].copy()) for k in order
+                    (int(k), work[NODE_WORK.SIZE * k + NODE_WORK.POSITION :][:3].copy())
+                    for k in order
                 ]
         return result
 

@@ -28,7 +28,7 @@ class DRIFT(metaclass=Record):
     """1, or -1 if the joint is traversed from child to parent."""
     COORDINATES = 1
     """Degrees of freedom of the joint's first two coordinates, -1 for a constant one."""
-    TURNS = 3
+    ROTATIONS = 3
     """Operations that are the joint's three rotations, -1 for one that does not move."""
 
 
@@ -83,7 +83,7 @@ def move_drift(
     # The first axis is fixed in the parent, so that only the second and third rotation have an
     # error.
     for row in range(1, 3):
-        last_turn = drift_ints[DRIFT.TURNS + row]
+        last_turn = drift_ints[DRIFT.ROTATIONS + row]
         if last_turn < 0:
             continue
         # Simbody rotates the axis of this angle by wrong rates of the angles before it: it takes the
@@ -91,7 +91,7 @@ def move_drift(
         # rotations before the axis.
         drift = ZERO
         for turn in range(3):
-            number = drift_ints[DRIFT.TURNS + turn]
+            number = drift_ints[DRIFT.ROTATIONS + turn]
             if number < 0:
                 continue
             rate_error = 0.0

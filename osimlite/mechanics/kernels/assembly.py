@@ -43,7 +43,7 @@ class POSE_STATUS(metaclass=Record):
 
     ASSEMBLED = 0.0
     """Pose that fulfils the constraints."""
-    APART = 1.0
+    UNASSEMBLED = 1.0
     """Pose near which no pose fulfils the constraints."""
 
 
@@ -119,7 +119,9 @@ def assemble_poses(
         frame, solution = at(frames, (1 + size) * number), at(solutions, (1 + size) * number)
         data[WORK.TIME] = frame[0]
         solution[size] = (
-            POSE_STATUS.ASSEMBLED if assemble_pose(a, at(frame, 1), solution) else POSE_STATUS.APART
+            POSE_STATUS.ASSEMBLED
+            if assemble_pose(a, at(frame, 1), solution)
+            else POSE_STATUS.UNASSEMBLED
         )
     return OUTCOME.OK
 

@@ -33,7 +33,7 @@ class ASSEMBLY(metaclass=Record):
 class ASSEMBLY_ARRAY(metaclass=Record):
     """Indices of the integer arrays with one entry per degree of freedom."""
 
-    HELD = 0
+    HOLDS = 0
     """FREED, HELD_BY_USER or HELD_AT_END of `HOLD`."""
     COUNTED = 1
     """1 where a change of the coordinate adds to the cost, else 0."""

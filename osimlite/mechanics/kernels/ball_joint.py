@@ -74,19 +74,19 @@ def place_ball(
     s2, c2 = sine_cosine(y[angles[1]])
     s3, c3 = sine_cosine(y[angles[2]])
     axes = axes_from_rows(frame)
-    turned_by = rotation_from_xyz(s1, c1, s2, c2, s3, c3)
-    end = multiply_elementwise(vector(radii, 0), turned_by[2])
+    ball_rotation = rotation_from_xyz(s1, c1, s2, c2, s3, c3)
+    end = multiply_elementwise(vector(radii, 0), ball_rotation[2])
     # The frame that the speeds are about is that of the parent: before the motion, or, if the joint
     # is traversed from its end, behind it.
     if j[OPERATION.MOTION] == MOTION.BALL:
         copy_numbers(12, frame, operation_record)
         set_frame(
             frame,
-            multiply_rotations(axes, turned_by),
+            multiply_rotations(axes, ball_rotation),
             plus(vector(frame, LINK_WORK.POSITION), combine_axes(axes, end)),
         )
     else:
-        axes = multiply_rotations(axes, transpose_rotation(turned_by))
+        axes = multiply_rotations(axes, transpose_rotation(ball_rotation))
         set_frame(frame, axes, minus(vector(frame, LINK_WORK.POSITION), combine_axes(axes, end)))
         copy_numbers(12, frame, operation_record)
     return OUTCOME.OK

@@ -40,9 +40,9 @@ class CURVE_ROW(metaclass=Record):
     """Results."""
     INSIDE = 1
     """0.0 for an argument beyond the curve, whose result is known at once, else 1.0."""
-    GOES_ON = 2
+    CONTINUES = 2
     """1.0 while the search continues, else 0.0."""
-    REST = 3
+    REMAINDER = 3
     """The distances of the arguments from the start of their sections."""
     U = 4
     """The parameters u."""
@@ -69,13 +69,13 @@ def request_value(x: Floats, lanes: Floats, number: int, offset: int, z: float) 
     if end == FIRST or z > c[LAST]:
         lane[LANES * CURVE_ROW.VALUE] = c[end + 1] + c[end + 2] * (z - c[end])
         # A linear section whose search converges at once.
-        lane[LANES * CURVE_ROW.INSIDE] = lane[LANES * CURVE_ROW.REST] = lane[
+        lane[LANES * CURVE_ROW.INSIDE] = lane[LANES * CURVE_ROW.REMAINDER] = lane[
             LANES * CURVE_ROW.U
         ] = 0.0
         lane[LANES * CURVE_ROW.OF_X] = 1.0
         return
     section, remainder, u = find_section(c, z)
-    lane[LANES * CURVE_ROW.INSIDE], lane[LANES * CURVE_ROW.REST], lane[LANES * CURVE_ROW.U] = (
+    lane[LANES * CURVE_ROW.INSIDE], lane[LANES * CURVE_ROW.REMAINDER], lane[LANES * CURVE_ROW.U] = (
         1.0,
         remainder,
         u,
@@ -105,12 +105,12 @@ def request_sum(
         lane[LANES * CURVE_ROW.VALUE] = extrapolate_sum(c, of_y, of_x, total, end)
         lane[LANES * CURVE_ROW.INSIDE] = lane[LANES * CURVE_ROW.U] = 0.0
         # total - total is 0, or NaN for an undefined total, which must show in the result.
-        lane[LANES * CURVE_ROW.REST], lane[LANES * CURVE_ROW.OF_X] = total - total, 1.0
+        lane[LANES * CURVE_ROW.REMAINDER], lane[LANES * CURVE_ROW.OF_X] = total - total, 1.0
         for k in range(1, COEFFICIENTS):
             lane[LANES * (CURVE_ROW.OF_X + k)] = 0.0
         return
     section, remainder, u = find_section_of_sum(c, of_y, of_x, total)
-    lane[LANES * CURVE_ROW.INSIDE], lane[LANES * CURVE_ROW.REST], lane[LANES * CURVE_ROW.U] = (
+    lane[LANES * CURVE_ROW.INSIDE], lane[LANES * CURVE_ROW.REMAINDER], lane[LANES * CURVE_ROW.U] = (
         1.0,
         remainder,
         u,
@@ -136,7 +136,7 @@ def request_residual(lanes: Any, number: int) -> float:
         LANES * CURVE_ROW.OF_X + number,
         LANES,
         lanes[LANES * CURVE_ROW.U + number],
-        lanes[LANES * CURVE_ROW.REST + number],
+        lanes[LANES * CURVE_ROW.REMAINDER + number],
     )
 
 
@@ -160,7 +160,7 @@ def compute_requests(lanes: Any, request_count: int, rounds: int) -> None:
     """
     # Separate loops over the lanes, so that each becomes vector instructions.
     for lane in range(request_count):
-        lanes[LANES * CURVE_ROW.GOES_ON + lane] = 1.0
+        lanes[LANES * CURVE_ROW.CONTINUES + lane] = 1.0
     for _ in range(rounds):
         for lane in range(request_count):
             step_lane(lanes, lane)
@@ -168,8 +168,11 @@ def compute_requests(lanes: Any, request_count: int, rounds: int) -> None:
         store_result(lanes, lane)
     # Lanes that need more steps than most continue alone.
     for lane in range(request_count):
-        if lanes[LANES * CURVE_ROW.GOES_ON + lane] > 0.0:
-            u, remainder = lanes[LANES * CURVE_ROW.U + lane], lanes[LANES * CURVE_ROW.REST + lane]
+        if lanes[LANES * CURVE_ROW.CONTINUES + lane] > 0.0:
+            u, remainder = (
+                lanes[LANES * CURVE_ROW.U + lane],
+                lanes[LANES * CURVE_ROW.REMAINDER + lane],
+            )
             u, _, _, _ = search_section(
                 lanes, LANES * CURVE_ROW.OF_X + lane, LANES, u, remainder, ROUNDS - rounds
             )
@@ -185,17 +188,17 @@ def step_lane(lanes: Any, lane: int) -> None:
         lane: number of the lane.
     """
     previous_u = lanes[LANES * CURVE_ROW.U + lane]
-    is_going = lanes[LANES * CURVE_ROW.GOES_ON + lane] > 0.0
-    u, goes_on = take_halley_step(
+    is_going = lanes[LANES * CURVE_ROW.CONTINUES + lane] > 0.0
+    u, continues = take_halley_step(
         lanes,
         LANES * CURVE_ROW.OF_X + lane,
         LANES,
         previous_u,
-        lanes[LANES * CURVE_ROW.REST + lane],
+        lanes[LANES * CURVE_ROW.REMAINDER + lane],
     )
     # Select instead of branching, since lanes of one vector instruction do the same.
     lanes[LANES * CURVE_ROW.U + lane] = u if is_going else previous_u
-    lanes[LANES * CURVE_ROW.GOES_ON + lane] = 1.0 if is_going and goes_on else 0.0
+    lanes[LANES * CURVE_ROW.CONTINUES + lane] = 1.0 if is_going and continues else 0.0
 
 
 def store_result(lanes: Any, lane: int) -> None:

@@ -92,7 +92,7 @@ def correct_geodesics(
         a[k] = 0.0
     number, previous_obstacle = 0, first
     for k in range(first + 1, last):
-        obstacle_record = at(record, elements[ELEMENT.SIZE * k + ELEMENT.KEPT])
+        obstacle_record = at(record, elements[ELEMENT.SIZE * k + ELEMENT.RECORD])
         if obstacle_record[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
             line = at(lines, 4 * number)
             next_line = at(lines, 4 * number + 4)
@@ -107,7 +107,7 @@ def correct_geodesics(
             )
             if number > 0:
                 previous_record = at(
-                    record, elements[ELEMENT.SIZE * previous_obstacle + ELEMENT.KEPT]
+                    record, elements[ELEMENT.SIZE * previous_obstacle + ELEMENT.RECORD]
                 )
                 set_far_rows(
                     obstacle_record,
@@ -142,7 +142,7 @@ def correct_geodesics(
     # same part.
     step, number = 1.0, 0
     for k in range(first + 1, last):
-        obstacle_record = at(record, elements[ELEMENT.SIZE * k + ELEMENT.KEPT])
+        obstacle_record = at(record, elements[ELEMENT.SIZE * k + ELEMENT.RECORD])
         if obstacle_record[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
             largest_rotation = largest_turn(obstacle_record, at(corrections, 4 * number))
             if largest_rotation > LARGEST:
@@ -151,7 +151,7 @@ def correct_geodesics(
     number = 0
     for k in range(first + 1, last):
         element = at(elements, ELEMENT.SIZE * k)
-        obstacle_record = at(record, element[ELEMENT.KEPT])
+        obstacle_record = at(record, element[ELEMENT.RECORD])
         if obstacle_record[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
             surface = at(p, element[ELEMENT.AT] + OBSTACLE.SURFACE)
             if not shoot_again(

@@ -104,11 +104,11 @@ def place_element(model: Ints, data: Floats, element: Ints, p: Floats, record: F
         record: record of the cable; the part of the element is filled.
     """
     numbers = at(p, element[ELEMENT.AT])
-    element_record = at(record, element[ELEMENT.KEPT])
+    element_record = at(record, element[ELEMENT.RECORD])
     link = element[ELEMENT.LINK]
     if element[ELEMENT.IS_OBSTACLE] == 0:
         store_vector(
-            element_record, 0, station(model, data, link, vector(numbers, CABLE_POINT.PLACE))
+            element_record, 0, station(model, data, link, vector(numbers, CABLE_POINT.STATION))
         )
         return
     place_frame(
@@ -166,12 +166,12 @@ def find_cable(
             return nan
     # Directions at the points, for the forces.
     store_vector(
-        at(record, elements[ELEMENT.SIZE * first + ELEMENT.KEPT]),
+        at(record, elements[ELEMENT.SIZE * first + ELEMENT.RECORD]),
         CABLE_POINT_WORK.AFTER,
         vector(lines, 0),
     )
     store_vector(
-        at(record, elements[ELEMENT.SIZE * last_element + ELEMENT.KEPT]),
+        at(record, elements[ELEMENT.SIZE * last_element + ELEMENT.RECORD]),
         CABLE_POINT_WORK.BEFORE,
         vector(lines, 4 * count),
     )
@@ -179,7 +179,7 @@ def find_cable(
     for k in range(count + 1):
         length += lines[4 * k + 3]
     for k in range(first + 1, last_element):
-        element_record = at(record, elements[ELEMENT.SIZE * k + ELEMENT.KEPT])
+        element_record = at(record, elements[ELEMENT.SIZE * k + ELEMENT.RECORD])
         if element_record[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
             length += element_record[OBSTACLE_WORK.CURVE + GEODESIC.ARC]
     return length
@@ -203,7 +203,7 @@ def update_contact(
         False if a neighbouring point is inside the obstacle or there is no geodesic.
     """
     element = at(elements, ELEMENT.SIZE * number)
-    numbers, obstacle_record = at(p, element[ELEMENT.AT]), at(record, element[ELEMENT.KEPT])
+    numbers, obstacle_record = at(p, element[ELEMENT.AT]), at(record, element[ELEMENT.RECORD])
     geodesic = at(obstacle_record, OBSTACLE_WORK.CURVE)
     pose = at(obstacle_record, OBSTACLE_WORK.IN_GROUND)
     surface = at(numbers, OBSTACLE.SURFACE)
@@ -271,11 +271,11 @@ def find_neighbour(
     k = number + step
     while (
         k != limit
-        and record[elements[ELEMENT.SIZE * k + ELEMENT.KEPT] + OBSTACLE_WORK.STATE]
+        and record[elements[ELEMENT.SIZE * k + ELEMENT.RECORD] + OBSTACLE_WORK.STATE]
         == OBSTACLE_STATE.LIFTED
     ):
         k += step
-    element_record = at(record, elements[ELEMENT.SIZE * k + ELEMENT.KEPT])
+    element_record = at(record, elements[ELEMENT.SIZE * k + ELEMENT.RECORD])
     if k == limit:
         point = vector(element_record, 0)
     else:
@@ -321,9 +321,9 @@ def draw_lines(elements: Ints, record: Floats, first: int, last_element: int, li
         The number of touched obstacles.
     """
     count = 0
-    start = vector(record, elements[ELEMENT.SIZE * first + ELEMENT.KEPT])
+    start = vector(record, elements[ELEMENT.SIZE * first + ELEMENT.RECORD])
     for k in range(first + 1, last_element + 1):
-        element_record = at(record, elements[ELEMENT.SIZE * k + ELEMENT.KEPT])
+        element_record = at(record, elements[ELEMENT.SIZE * k + ELEMENT.RECORD])
         if k == last_element or element_record[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
             chord = minus(
                 vector(
@@ -361,7 +361,7 @@ def measure_kinks(
     """
     largest_kink, number = 0.0, 0
     for k in range(first + 1, last):
-        obstacle_record = at(record, elements[ELEMENT.SIZE * k + ELEMENT.KEPT])
+        obstacle_record = at(record, elements[ELEMENT.SIZE * k + ELEMENT.RECORD])
         if obstacle_record[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
             for end in (OBSTACLE_WORK.GROUND_START, OBSTACLE_WORK.GROUND_END):
                 line = vector(
@@ -393,11 +393,11 @@ def lengthening_speed(
         record: record of the cable.
     """
     total = 0.0
-    segment_start = vector(record, elements[ELEMENT.KEPT])
+    segment_start = vector(record, elements[ELEMENT.RECORD])
     start_velocity = velocity(model, data, elements[ELEMENT.LINK], segment_start)
     for k in range(1, count):
         element = at(elements, ELEMENT.SIZE * k)
-        element_record = at(record, element[ELEMENT.KEPT])
+        element_record = at(record, element[ELEMENT.RECORD])
         if (
             element[ELEMENT.IS_OBSTACLE] == 0
             or element_record[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES
@@ -446,7 +446,7 @@ def pull_cable(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
     for k in range(last_element + 1):
         element = at(elements, ELEMENT.SIZE * k)
         numbers = at(p, element[ELEMENT.AT])
-        element_record = at(result, element[ELEMENT.KEPT])
+        element_record = at(result, element[ELEMENT.RECORD])
         link = element[ELEMENT.LINK]
         if element[ELEMENT.IS_OBSTACLE] == 0:
             # The station at which the cable pulls may differ from the point that it passes.

@@ -32,7 +32,7 @@ class ELEMENT(metaclass=Record):
     """Link."""
     AT = 2
     """Offset of its numbers."""
-    KEPT = 3
+    RECORD = 3
     """Offset of its part of the record."""
     SIZE = 4
     """Number of integers of an element."""
@@ -48,7 +48,7 @@ class CABLE_WORK(metaclass=Record):
 class CABLE_POINT(metaclass=Record):
     """Numbers of a point of a cable."""
 
-    PLACE = 0
+    STATION = 0
     """Station that the cable passes (m)."""
     PULLED = 3
     """Station at which the cable pulls (m)."""

@@ -76,7 +76,7 @@ def chain_dynamics(
         data[k] = 0.0
     for k in range(h[CHAIN.PRODUCTS]):
         product = at(model, h[CHAIN.PRODUCT_AT] + PRODUCT.SIZE * k)
-        data[product[PRODUCT.PLACE]] += (
+        data[product[PRODUCT.TARGET]] += (
             shares[product[PRODUCT.ONE]]
             * shares[product[PRODUCT.TWO]]
             * matrix[product[PRODUCT.ENTRY]]
@@ -145,7 +145,7 @@ def move_joints(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) 
     count = h[CHAIN.JOINTS]
     for number in range(count):
         joint = at(model, h[CHAIN.JOINT_AT] + JOINT.SIZE * number)
-        moves = at(data, h[CHAIN.WORK_JOINTS] + number)
+        joint_motion = at(data, h[CHAIN.WORK_JOINTS] + number)
         joint_kind = joint[JOINT.KIND]
         source = joint[JOINT.SOURCE]
         component_index = joint[JOINT.PART]
@@ -154,24 +154,31 @@ def move_joints(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) 
         if joint_kind == JOINT_KIND.LINE:
             factor = reals[component_index]
             shares[0] = factor
-            moves[0], moves[count], moves[2 * count] = factor * y[source], factor * f[source], 0.0
+            joint_motion[0], joint_motion[count], joint_motion[2 * count] = (
+                factor * y[source],
+                factor * f[source],
+                0.0,
+            )
             continue
         j = operation_ints(model, source)
         a = operation_work(model, data, source)
         if joint_kind == JOINT_KIND.AMOUNT_OF:
             for k in range(j[OPERATION.ARGUMENT_COUNT]):
                 shares[k] = data[j[OPERATION.GRADIENT] + k]
-            moves[0], moves[count], moves[2 * count] = (
+            joint_motion[0], joint_motion[count], joint_motion[2 * count] = (
                 a[OPERATION_WORK.AMOUNT],
                 a[OPERATION_WORK.RATE],
                 a[OPERATION_WORK.CURVATURE],
             )
         elif joint_kind == JOINT_KIND.ANGLE:
             angles = at(model, j[OPERATION.ARGUMENTS])
-            moves[0], moves[count] = y[angles[component_index]], f[angles[component_index]]
-            moves[2 * count] = move_angle(angles, y, f, component_index, shares)
+            joint_motion[0], joint_motion[count] = (
+                y[angles[component_index]],
+                f[angles[component_index]],
+            )
+            joint_motion[2 * count] = move_angle(angles, y, f, component_index, shares)
         elif joint_kind == JOINT_KIND.ELLIPSOID:
-            moves[0], moves[count], moves[2 * count] = move_end(
+            joint_motion[0], joint_motion[count], joint_motion[2 * count] = move_end(
                 at(model, j[OPERATION.ARGUMENTS]),
                 y,
                 at(y, model[MODEL.DOFS]),
@@ -182,8 +189,8 @@ def move_joints(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) 
         else:
             # The joint of a drift has no motion, but an acceleration.
             turn = at(a, OPERATION_WORK.AXIS + component_index)
-            moves[0] = moves[count] = 0.0
-            moves[2 * count] = (
+            joint_motion[0] = joint_motion[count] = 0.0
+            joint_motion[2 * count] = (
                 turn[0] * a[OPERATION_WORK.AMOUNT]
                 + turn[3] * a[OPERATION_WORK.RATE]
                 + turn[6] * a[OPERATION_WORK.CURVATURE]

@@ -163,7 +163,7 @@ def closest_on_ellipse(a: float, b: float, u: float, v: float) -> tuple[float, f
     return aa * u / (t + aa), bb * v / (t + bb)
 
 
-def mean_way_out(radii: Vector, start: Vector, chord: Vector, work: Floats) -> Vector:
+def mean_outward_direction(radii: Vector, start: Vector, chord: Vector, work: Floats) -> Vector:
     """Return the mean direction of the shortest ways out of an ellipsoid, from points of a chord.
 
     Args:

@@ -86,7 +86,7 @@ def evaluate_arc(
     component = int(table[ROD.COMPONENT])
     # Along the rod the factor is sin(theta) / theta; across it, the sine of the direction is taken
     # out, so that a factor (1 - cos(theta)) / (theta sin(theta)) remains.
-    share, first, second = axial_ratio(table, c) if component == 1 else transverse_ratio(table, c)
+    factor, first, second = axial_ratio(table, c) if component == 1 else transverse_ratio(table, c)
     # Chain rule from cos(theta) to both angles.
     oaa = first * haa + second * ga * ga
     oab = first * hab + second * ga * gb
@@ -99,11 +99,11 @@ def evaluate_arc(
     elif component == 2:
         v, va, vb, vaa, vab, vbb = sa * cb, ca * cb, -sa * sb, -sa * cb, -ca * sb, -sa * cb
     size = table[1] * table[ROD.LENGTH]
-    da, db = size * (v * oa + share * va), size * (v * ob + share * vb)
-    daa = size * (v * oaa + share * vaa + 2.0 * va * oa)
-    dab = size * (v * oab + share * vab + va * ob + vb * oa)
-    dbb = size * (v * obb + share * vbb + 2.0 * vb * ob)
-    return size * v * share, da, db, daa, dab, dbb
+    da, db = size * (v * oa + factor * va), size * (v * ob + factor * vb)
+    daa = size * (v * oaa + factor * vaa + 2.0 * va * oa)
+    dab = size * (v * oab + factor * vab + va * ob + vb * oa)
+    dbb = size * (v * obb + factor * vbb + 2.0 * vb * ob)
+    return size * v * factor, da, db, daa, dab, dbb
 
 
 def axial_ratio(table: Floats, cosine: float) -> tuple[float, float, float]:

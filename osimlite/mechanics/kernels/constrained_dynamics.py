@@ -113,7 +113,7 @@ def solve_by_multipliers(model: Ints, data: Floats, right: Floats, work: Floats)
     freedoms = at(model, model[MODEL.DOF_AT])
     pivots = at(data, model[MODEL.WORK_PIVOT])
     scales = work
-    push = at(work, size)
+    correction = at(work, size)
     values = at(work, 2 * size)
     spare = at(work, 2 * size + count)
     for k in range(size):
@@ -146,12 +146,12 @@ def solve_by_multipliers(model: Ints, data: Floats, right: Floats, work: Floats)
                 missing -= row[k] * right[k]
             values[i] = missing
         # The shortest solution in the scaled unknowns is the one that constraint forces cause.
-        solve_by_law(model, count, weighted, values, spare, push)
+        solve_by_law(model, count, weighted, values, spare, correction)
         for k in range(size):
-            push[k] *= scales[k]
-        solve_factor(model, data, push)
+            correction[k] *= scales[k]
+        solve_factor(model, data, correction)
         for k in range(size):
-            right[k] += push[k]
+            right[k] += correction[k]
     return True
 
 
@@ -239,25 +239,25 @@ def solve_in_null_space(
     free = size - rank
     # A particular solution of the equations; the free motion is added to it.
     solve_by_law(model, count, equations, values, spare, right)
-    pushed = at(spare, count)
+    mass_product = at(spare, count)
     reduced = at(spare, count + 2 * size)
     basis = at(spare, count + 2 * size + size * size)
-    reduced_rhs = at(pushed, size)
+    reduced_rhs = at(mass_product, size)
     # Its inertial forces reduce the forces of the free motion.
-    multiply_mass(model, matrix, right, pushed)
+    multiply_mass(model, matrix, right, mass_product)
     for k in range(size):
-        forces[k] -= pushed[k]
+        forces[k] -= mass_product[k]
     for j in range(free):
         direction = at(basis, size * j)
         for k in range(size):
             # The unit vectors beyond the rank, transformed by Q, span the null space of G.
             direction[k] = 1.0 if k == rank + j else 0.0
         apply_q(size, equations, rank, direction)
-        multiply_mass(model, matrix, direction, pushed)
+        multiply_mass(model, matrix, direction, mass_product)
         for i in range(j + 1):
             total = 0.0
             for k in range(size):
-                total += basis[size * i + k] * pushed[k]
+                total += basis[size * i + k] * mass_product[k]
             reduced[free * j + i] = total
         total = 0.0
         for k in range(size):

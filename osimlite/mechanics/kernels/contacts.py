@@ -189,7 +189,7 @@ def contact_response(
         center = station(model, data, second_link, vector(p, CONTACT_NUMBERS.CENTER))
         # The elastic force grows with d^(3/2), so that its relative derivative by the depth is 1.5
         # / d.
-        contact = PushedContact(first_link, second_link, point, center, n, v, 1.0 - p[12])
+        contact = ContactState(first_link, second_link, point, center, n, v, 1.0 - p[12])
         write_response(model, data, y, f, contact, axis, changes, 1.5 / d)
     return OUTCOME.OK
 
@@ -230,13 +230,13 @@ def smooth_contact_response(
     constants = SmoothContact(geometry[9], p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8])
     pressed, damped, dragged, growth = smooth_contact_derivatives(constants, d, n, v)
     if growth != 0.0:
-        touching = PushedContact(g[0], g[1], point, center, n, v, 0.5)
+        touching = ContactState(g[0], g[1], point, center, n, v, 0.5)
         changes = pressed, damped, dragged
         write_response(model, data, y, f, touching, i[ITEM.OWN + 1], changes, growth)
     return OUTCOME.OK
 
 
-class PushedContact(NamedTuple):
+class ContactState(NamedTuple):
     """Contact whose surfaces are pushed apart along the normal or across it."""
 
     one: int  # link of surface 1
@@ -251,7 +251,7 @@ class PushedContact(NamedTuple):
 class PointFactors(NamedTuple):
     """Factors of position and velocity of a point of a link."""
 
-    by_place: Vector  # factor of the position
+    by_position: Vector  # factor of the position
     by_motion: Vector  # factor of the velocity
 
 
@@ -260,7 +260,7 @@ def write_response(
     data: Floats,
     y: Floats,
     f: Floats,
-    contact: PushedContact,
+    contact: ContactState,
     axis: int,
     changes: Vector,
     growth: float,
@@ -283,25 +283,25 @@ def write_response(
     point = contact.point
     n = contact.n
     v = contact.v
-    push_direction, by_depth = n, 0.0
+    load_direction, by_depth = n, 0.0
     if axis > 0:
         # Any two directions perpendicular to the normal and each other serve.
         nx, ny, nz = n
-        push_direction = divide(cross(n, (1.0, 0.0, 0.0)), sqrt(ny * ny + nz * nz))
+        load_direction = divide(cross(n, (1.0, 0.0, 0.0)), sqrt(ny * ny + nz * nz))
         if abs(nx) > 0.7:
-            push_direction = divide(cross(n, (0.0, 1.0, 0.0)), sqrt(nx * nx + nz * nz))
+            load_direction = divide(cross(n, (0.0, 1.0, 0.0)), sqrt(nx * nx + nz * nz))
         if axis > 1:
-            push_direction = cross(n, push_direction)
+            load_direction = cross(n, load_direction)
         # Friction resists slip like a damper, whose constant grows with the depth.
-        change[1], by_depth = -dragged, -growth * dragged * dot(v, push_direction)
+        change[1], by_depth = -dragged, -growth * dragged * dot(v, load_direction)
     else:
         # Depth and approach increase the force, so that it resists both.
         change[0], change[1] = -pressed, -damped
-    apply_force(model, data, second_link, point, push_direction)
-    apply_force(model, data, first_link, point, times(-1.0, push_direction))
-    factors = PointFactors(times(by_depth, n), times(change[1], push_direction))
+    apply_force(model, data, second_link, point, load_direction)
+    apply_force(model, data, first_link, point, times(-1.0, load_direction))
+    factors = PointFactors(times(by_depth, n), times(change[1], load_direction))
     add_rotation_terms(model, data, y, f, second_link, contact, contact.center, factors)
-    factors = PointFactors(times(-by_depth, n), times(-change[1], push_direction))
+    factors = PointFactors(times(-by_depth, n), times(-change[1], load_direction))
     add_rotation_terms(model, data, y, f, first_link, contact, point, factors)
 
 
@@ -311,7 +311,7 @@ def add_rotation_terms(
     y: Floats,
     row: Floats,
     link: int,
-    contact: PushedContact,
+    contact: ContactState,
     center: Vector,
     factors: PointFactors,
 ) -> None:
@@ -358,8 +358,8 @@ def add_rotation_terms(
                     plus(cross(turn, shifting), cross(shift, turning)),
                     cross(cross(turn, turning), arm),
                 )
-                placed = dot(factors.by_place, plus(shift, cross(turn, arm)))
-                row[j[OPERATION.DOF]] += placed + dot(
+                position_term = dot(factors.by_position, plus(shift, cross(turn, arm)))
+                row[j[OPERATION.DOF]] += position_term + dot(
                     factors.by_motion, plus(swept, cross(spin, center_change))
                 )
                 rate = y[model[MODEL.DOFS] + j[OPERATION.DOF]]

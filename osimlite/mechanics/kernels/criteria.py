@@ -12,7 +12,7 @@ from math import cos, pi, sin
 
 from osimlite.mechanics.kernels.layout import Record
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
-from osimlite.mechanics.kernels.sensors import SENSES, SENSOR_NUMBERS, foot_position
+from osimlite.mechanics.kernels.sensors import SENSOR_NUMBERS, SENSOR_PLAN, foot_position
 
 
 class CRITERION_TYPE(metaclass=Record):
@@ -26,7 +26,7 @@ class CRITERION_TYPE(metaclass=Record):
     """Excess of a number of the sensor row beyond a range."""
     LARGEST_LOAD = 3
     """Excess of the larger load of two legs beyond a range."""
-    WHOLE_LOAD = 4
+    TOTAL_LOAD = 4
     """Excess of the total load of two legs beyond a range."""
     POWERS = 5
     """Sum of powers of activations; the kinds from here on are efforts."""
@@ -53,7 +53,7 @@ class JUMP_PHASE(metaclass=Record):
     """After its peak."""
 
 
-AT_REST = 1.51
+BASAL_POWER = 1.51
 """Power of a body at rest, W/kg (J. M. Wang et al., ACM Trans. Graph. 31, 2012)."""
 
 
@@ -62,11 +62,11 @@ class CRITERION(metaclass=Record):
 
     Attributes:
         KIND: type of the criterion, such as `CRITERION_TYPE.GAIT`.
-        PLACE: index in the sensor row, or a power.
+        INDEX: index in the sensor row, or a power.
         NUMBERS, WORKSPACE: offsets of the numbers and of the workspace of the criterion.
     """
 
-    KIND, PLACE, NUMBERS, WORKSPACE, SIZE = range(5)
+    KIND, INDEX, NUMBERS, WORKSPACE, SIZE = range(5)
 
 
 class CRITERION_NUMBERS(metaclass=Record):
@@ -123,17 +123,17 @@ class JUMP_WORK(metaclass=Record):
         START, HERE, PEAK, PREPARED: height of the mass centre at the start, now, at the highest point,
             and at the start of take-off (m).
         ENDED: whether the jumper has sunk or come down.
-        DOES: phase of the jump, such as `JUMP_PHASE.PREPARES`.
+        PHASE: phase of the jump, such as `JUMP_PHASE.PREPARES`.
     """
 
-    START, HERE, PEAK, PREPARED, ENDED, DOES = range(6)
+    START, HERE, PEAK, PREPARED, ENDED, PHASE = range(6)
 
 
-def begin_criteria(senses: Ints, i: Ints, row: Floats, work: Floats) -> None:
+def begin_criteria(sensor_plan: Ints, i: Ints, row: Floats, work: Floats) -> None:
     """Start all criteria with a sensor row.
 
     Args:
-        senses: plan of the sensor row.
+        sensor_plan: plan of the sensor row.
         i: integers of the criteria.
         row: sensor row.
         work: workspace of the criteria; filled.
@@ -141,9 +141,11 @@ def begin_criteria(senses: Ints, i: Ints, row: Floats, work: Floats) -> None:
     for number in range(i[0]):
         criterion = at(i, 1 + CRITERION.SIZE * number)
         noted = at(work, criterion[CRITERION.WORKSPACE])
-        centre = senses[SENSES.CENTRE]
+        centre = sensor_plan[SENSOR_PLAN.CENTRE]
         if criterion[CRITERION.KIND] == CRITERION_TYPE.GAIT:
-            noted[GAIT_WORK.BEFORE] = noted[GAIT_WORK.HERE] = compute_walked_distance(senses, row)
+            noted[GAIT_WORK.BEFORE] = noted[GAIT_WORK.HERE] = compute_walked_distance(
+                sensor_plan, row
+            )
             noted[GAIT_WORK.HEIGHT] = row[centre + 1]
             noted[GAIT_WORK.FALLEN] = noted[GAIT_WORK.COUNT] = 0.0
             # Unknown contact, so that a foot that stands from the start does not count as one that
@@ -152,7 +154,7 @@ def begin_criteria(senses: Ints, i: Ints, row: Floats, work: Floats) -> None:
         elif criterion[CRITERION.KIND] == CRITERION_TYPE.JUMP:
             for k in range(JUMP_WORK.ENDED):
                 noted[k] = row[centre + 1]
-            noted[JUMP_WORK.ENDED], noted[JUMP_WORK.DOES] = 0.0, JUMP_PHASE.PREPARES
+            noted[JUMP_WORK.ENDED], noted[JUMP_WORK.PHASE] = 0.0, JUMP_PHASE.PREPARES
         else:
             for k in range(SAMPLE_WORK.SIZE):
                 noted[k] = 0.0
@@ -160,7 +162,7 @@ def begin_criteria(senses: Ints, i: Ints, row: Floats, work: Floats) -> None:
 
 
 def update_criteria(
-    senses: Ints,
+    sensor_plan: Ints,
     sensor_numbers: Floats,
     i: Ints,
     p: Floats,
@@ -172,7 +174,7 @@ def update_criteria(
     """Update all criteria after a control step.
 
     Args:
-        senses: plan of the sensor row.
+        sensor_plan: plan of the sensor row.
         sensor_numbers: numbers of the sensor row.
         i: integers of the criteria.
         p: numbers of the criteria.
@@ -193,24 +195,28 @@ def update_criteria(
         if not numbers[CRITERION_NUMBERS.START] <= t < numbers[CRITERION_NUMBERS.STOP]:
             continue
         if criterion[CRITERION.KIND] == CRITERION_TYPE.GAIT:
-            note_gait(senses, numbers, t, row, noted)
+            note_gait(sensor_plan, numbers, t, row, noted)
             has_fallen = has_fallen or noted[GAIT_WORK.FALLEN] > 0.0
             continue
         if criterion[CRITERION.KIND] == CRITERION_TYPE.JUMP:
-            note_jump(senses, numbers, t, row, noted)
+            note_jump(sensor_plan, numbers, t, row, noted)
             has_fallen = has_fallen or noted[JUMP_WORK.ENDED] > 0.0
             continue
         if criterion[CRITERION.KIND] == CRITERION_TYPE.WANG:
-            value = metabolic_power(senses, sensor_numbers, numbers, row, u)
+            value = metabolic_power(sensor_plan, sensor_numbers, numbers, row, u)
         elif criterion[CRITERION.KIND] >= CRITERION_TYPE.POWERS:
             value = muscle_effort(
-                senses, sensor_numbers, criterion[CRITERION.KIND], criterion[CRITERION.PLACE], row
+                sensor_plan,
+                sensor_numbers,
+                criterion[CRITERION.KIND],
+                criterion[CRITERION.INDEX],
+                row,
             )
         else:
             value = range_penalty(
-                senses, criterion[CRITERION.KIND], criterion[CRITERION.PLACE], numbers, row
+                sensor_plan, criterion[CRITERION.KIND], criterion[CRITERION.INDEX], numbers, row
             )
-        noted[SAMPLE_WORK.HERE] = row[senses[SENSES.CENTRE]]
+        noted[SAMPLE_WORK.HERE] = row[sensor_plan[SENSOR_PLAN.CENTRE]]
         add_sample(noted, t, value)
     return has_fallen
 
@@ -235,43 +241,50 @@ def add_sample(noted: Floats, t: float, value: float) -> None:
     noted[SAMPLE_WORK.BEGUN], noted[SAMPLE_WORK.TIME], noted[SAMPLE_WORK.VALUE] = 1.0, t, value
 
 
-def compute_walked_distance(senses: Ints, row: Floats) -> float:
+def compute_walked_distance(sensor_plan: Ints, row: Floats) -> float:
     """Return the distance of a walker along x (m).
 
     It is the mean of the two smallest positions of both feet and the mass centre.
 
     Args:
-        senses: plan of the sensor row.
+        sensor_plan: plan of the sensor row.
         row: sensor row.
     """
-    centre = row[senses[SENSES.CENTRE]]
-    first_foot = foot_position(senses, row, 0)
-    second_foot = foot_position(senses, row, 1)
+    centre = row[sensor_plan[SENSOR_PLAN.CENTRE]]
+    first_foot = foot_position(sensor_plan, row, 0)
+    second_foot = foot_position(sensor_plan, row, 1)
     # SCONE takes the two smallest of three, so that a trunk that falls forwards adds little.
     if centre >= first_foot and centre >= second_foot:
         return 0.5 * (first_foot + second_foot)
     return 0.5 * (centre + min(first_foot, second_foot))
 
 
-def note_gait(senses: Ints, numbers: Floats, t: float, row: Floats, noted: Floats) -> None:
+def note_gait(sensor_plan: Ints, numbers: Floats, t: float, row: Floats, noted: Floats) -> None:
     """Update a gait: detect a fall and steps.
 
     A fall is a mass centre below a part of its height at the start. A step is a foot that lands,
     after a shortest duration since the last one.
 
     Args:
-        senses: plan of the sensor row.
+        sensor_plan: plan of the sensor row.
         numbers: numbers of the criterion.
         t: time (s).
         row: sensor row.
         noted: workspace of the criterion, see `GAIT_WORK`.
     """
-    noted[GAIT_WORK.HERE] = compute_walked_distance(senses, row)
-    if row[senses[SENSES.CENTRE] + 1] < numbers[CRITERION_NUMBERS.HEIGHT] * noted[GAIT_WORK.HEIGHT]:
+    noted[GAIT_WORK.HERE] = compute_walked_distance(sensor_plan, row)
+    if (
+        row[sensor_plan[SENSOR_PLAN.CENTRE] + 1]
+        < numbers[CRITERION_NUMBERS.HEIGHT] * noted[GAIT_WORK.HEIGHT]
+    ):
         noted[GAIT_WORK.FALLEN] = 1.0
     has_touched = False
     for leg in range(2):
-        touches = 1.0 if row[senses[SENSES.LOADS] + leg] >= numbers[CRITERION_NUMBERS.LOAD] else 0.0
+        touches = (
+            1.0
+            if row[sensor_plan[SENSOR_PLAN.LOADS] + leg] >= numbers[CRITERION_NUMBERS.LOAD]
+            else 0.0
+        )
         has_touched = has_touched or (touches > 0.0 and noted[GAIT_WORK.TOUCHES + leg] == 0.0)
         noted[GAIT_WORK.TOUCHES + leg] = touches
     count = int(noted[GAIT_WORK.COUNT])
@@ -288,48 +301,48 @@ def note_gait(senses: Ints, numbers: Floats, t: float, row: Floats, noted: Float
         noted[GAIT_WORK.COUNT] += 1.0
 
 
-def note_jump(senses: Ints, numbers: Floats, t: float, row: Floats, noted: Floats) -> None:
+def note_jump(sensor_plan: Ints, numbers: Floats, t: float, row: Floats, noted: Floats) -> None:
     """Update a jump: follow the height of the mass centre and the phase.
 
     The jumper takes off once it rises after its time to prepare, and comes down when it sinks, or when
     it is on the ground after a flight.
 
     Args:
-        senses: plan of the sensor row.
+        sensor_plan: plan of the sensor row.
         numbers: numbers of the criterion.
         t: time (s).
         row: sensor row.
         noted: workspace of the criterion, see `JUMP_WORK`.
     """
-    height = row[senses[SENSES.CENTRE] + 1]
-    rise = row[senses[SENSES.RISE]]
-    does = noted[JUMP_WORK.DOES]
-    has_load = row[senses[SENSES.LOADS]] + row[senses[SENSES.LOADS] + 1] > 0.0
+    height = row[sensor_plan[SENSOR_PLAN.CENTRE] + 1]
+    rise = row[sensor_plan[SENSOR_PLAN.RISE]]
+    phase = noted[JUMP_WORK.PHASE]
+    has_load = row[sensor_plan[SENSOR_PLAN.LOADS]] + row[sensor_plan[SENSOR_PLAN.LOADS] + 1] > 0.0
     noted[JUMP_WORK.HERE], noted[JUMP_WORK.PEAK] = height, max(noted[JUMP_WORK.PEAK], height)
     if height < numbers[CRITERION_NUMBERS.HEIGHT] * noted[JUMP_WORK.START]:
         noted[JUMP_WORK.ENDED] = 1.0
-    elif does == JUMP_PHASE.PREPARES:
+    elif phase == JUMP_PHASE.PREPARES:
         if t >= numbers[CRITERION_NUMBERS.PREPARE] and (rise > 0.0 or not has_load):
-            noted[JUMP_WORK.DOES], noted[JUMP_WORK.PREPARED] = JUMP_PHASE.TAKES_OFF, height
-    elif does == JUMP_PHASE.TAKES_OFF and not has_load:
-        noted[JUMP_WORK.DOES] = JUMP_PHASE.FLIES
-    elif does < JUMP_PHASE.COMES_DOWN and (rise < 0.0 or (does == JUMP_PHASE.FLIES and has_load)):
-        noted[JUMP_WORK.DOES], noted[JUMP_WORK.ENDED] = (
+            noted[JUMP_WORK.PHASE], noted[JUMP_WORK.PREPARED] = JUMP_PHASE.TAKES_OFF, height
+    elif phase == JUMP_PHASE.TAKES_OFF and not has_load:
+        noted[JUMP_WORK.PHASE] = JUMP_PHASE.FLIES
+    elif phase < JUMP_PHASE.COMES_DOWN and (rise < 0.0 or (phase == JUMP_PHASE.FLIES and has_load)):
+        noted[JUMP_WORK.PHASE], noted[JUMP_WORK.ENDED] = (
             JUMP_PHASE.COMES_DOWN,
             numbers[CRITERION_NUMBERS.AT_PEAK],
         )
 
 
 def range_penalty(
-    senses: Ints, criterion_type: int, offset: int, numbers: Floats, row: Floats
+    sensor_plan: Ints, criterion_type: int, offset: int, numbers: Floats, row: Floats
 ) -> float:
     """Return the penalty of a number beyond its range.
 
     It is linear off + squared off^2, where off is the distance from the range.
 
     Args:
-        senses: plan of the sensor row.
-        criterion_type: NUMBER, LARGEST_LOAD or WHOLE_LOAD of `CRITERION_TYPE`.
+        sensor_plan: plan of the sensor row.
+        criterion_type: NUMBER, LARGEST_LOAD or TOTAL_LOAD of `CRITERION_TYPE`.
         offset: index of the number in the row.
         numbers: numbers of the criterion.
         row: sensor row.
@@ -337,8 +350,8 @@ def range_penalty(
     first_value = row[offset]
     second_value = 0.0
     if criterion_type != CRITERION_TYPE.NUMBER:
-        first_value = row[senses[SENSES.LOADS]]
-        second_value = row[senses[SENSES.LOADS] + 1]
+        first_value = row[sensor_plan[SENSOR_PLAN.LOADS]]
+        second_value = row[sensor_plan[SENSOR_PLAN.LOADS] + 1]
         first_value, second_value = (
             (max(first_value, second_value), 0.0)
             if criterion_type == CRITERION_TYPE.LARGEST_LOAD
@@ -354,34 +367,34 @@ def range_penalty(
 
 
 def muscle_effort(
-    senses: Ints, sensor_numbers: Floats, criterion_type: int, power: int, row: Floats
+    sensor_plan: Ints, sensor_numbers: Floats, criterion_type: int, power: int, row: Floats
 ) -> float:
     """Return the sum of the activations to a power, or 1 plus the sum of the tensions (N).
 
     Args:
-        senses: plan of the sensor row.
+        sensor_plan: plan of the sensor row.
         sensor_numbers: numbers of the sensor row.
         criterion_type: POWERS or TENSIONS of `CRITERION_TYPE`.
         power: exponent of the activations.
         row: sensor row.
     """
-    count = senses[SENSES.MUSCLES]
+    count = sensor_plan[SENSOR_PLAN.MUSCLES]
     total = 1.0 if criterion_type == CRITERION_TYPE.TENSIONS else 0.0
     strengths = at(sensor_numbers, SENSOR_NUMBERS.HEAD + count)
     for k in range(count):
         contribution = 1.0
         if criterion_type == CRITERION_TYPE.TENSIONS:
-            contribution = row[senses[SENSES.FORCES] + k] * strengths[k]
+            contribution = row[sensor_plan[SENSOR_PLAN.FORCES] + k] * strengths[k]
         else:
             # The exponent is an integer.
             for _ in range(power):
-                contribution *= row[senses[SENSES.ACTIVATIONS] + k]
+                contribution *= row[sensor_plan[SENSOR_PLAN.ACTIVATIONS] + k]
         total += contribution
     return total
 
 
 def metabolic_power(
-    senses: Ints, sensor_numbers: Floats, numbers: Floats, row: Floats, excitations: Floats
+    sensor_plan: Ints, sensor_numbers: Floats, numbers: Floats, row: Floats, excitations: Floats
 ) -> float:
     """Return the metabolic power of all muscles (W).
 
@@ -393,34 +406,34 @@ def metabolic_power(
     of shortening and work are added.
 
     Args:
-        senses: plan of the sensor row.
+        sensor_plan: plan of the sensor row.
         sensor_numbers: numbers of the sensor row.
         numbers: numbers of the criterion.
         row: sensor row.
         excitations: excitations of the muscles.
     """
-    count = senses[SENSES.MUSCLES]
+    count = sensor_plan[SENSOR_PLAN.MUSCLES]
     slow = numbers[CRITERION_NUMBERS.SLOW]
     total = 0.0
     optimal = at(sensor_numbers, SENSOR_NUMBERS.HEAD)
     strengths = at(sensor_numbers, SENSOR_NUMBERS.HEAD + count)
     for k in range(count):
         u = QUARTER * excitations[k]
-        a = QUARTER * row[senses[SENSES.ACTIVATIONS] + k]
-        n = row[senses[SENSES.LENGTHS] + k]
+        a = QUARTER * row[sensor_plan[SENSOR_PLAN.ACTIVATIONS] + k]
+        n = row[sensor_plan[SENSOR_PLAN.LENGTHS] + k]
         of_activation = 40.0 * slow * sin(u) + 133.0 * (1.0 - slow) * (1.0 - cos(u))
         of_maintenance = 74.0 * slow * sin(a) + 111.0 * (1.0 - slow) * (1.0 - cos(a))
         # Factor of the fiber length: 1/2 for short fibers, largest at the optimal length, 0 beyond
         # 1.5.
         shape = 0.5 if n < 0.5 else n if n < 1.0 else 3.0 - 2.0 * n if n < 1.5 else 0.0
-        shortens = -row[senses[SENSES.VELOCITIES] + k] * optimal[k]
+        shortens = -row[sensor_plan[SENSOR_PLAN.VELOCITIES] + k] * optimal[k]
         # Lengthening fibers take up no heat here, and their negative work is not recovered.
         # Forces of the row are parts of the strength; active forces are in N.
-        heat = max(0.0, 0.25 * row[senses[SENSES.FORCES] + k] * strengths[k] * shortens)
-        work = max(0.0, row[senses[SENSES.ACTIVE] + k] * shortens)
+        heat = max(0.0, 0.25 * row[sensor_plan[SENSOR_PLAN.FORCES] + k] * strengths[k] * shortens)
+        work = max(0.0, row[sensor_plan[SENSOR_PLAN.ACTIVE] + k] * shortens)
         total += (
             numbers[CRITERION_NUMBERS.MASSES + k] * (of_activation + shape * of_maintenance)
             + heat
             + work
         )
-    return AT_REST * sensor_numbers[SENSOR_NUMBERS.MASS] + total
+    return BASAL_POWER * sensor_numbers[SENSOR_NUMBERS.MASS] + total

@@ -49,7 +49,7 @@ TOUCH = 1e-10
 class SEARCH_STAGE(metaclass=Record):
     """Stages of a search."""
 
-    MEANT = 0
+    ACTIVE_SIDE = 0
     """Each surface is passed on its active side."""
     STRING = 1
     """Starts on ellipsoids come from a tightened string."""
@@ -132,7 +132,7 @@ def lay_chain(
         chain: slots; the geodesic of slot `k` is filled.
         count: number of slots in use.
         k: slot of the surface.
-        stage: MEANT, STRING or ALONE of `SEARCH_STAGE`.
+        stage: ACTIVE_SIDE, STRING or ALONE of `SEARCH_STAGE`.
         work: workspace of a search.
 
     Returns:

@@ -51,17 +51,17 @@ def trace_geodesics(
     for k in range(int(result[PATH_WORK.COUNT])):
         number = int(order[k])
         node_record = at(work, NODE_WORK.SIZE * number)
-        store_vector(f, 3 * count, vector(node_record, NODE_WORK.PLACE))
+        store_vector(f, 3 * count, vector(node_record, NODE_WORK.POSITION))
         count += 1
         wrap = (number - points) // 2
         # Of the two nodes of a wrap, the first is that where the geodesic begins.
         if number >= points and number == points + 2 * wrap:
             surface = at(
                 p,
-                wraps[GEODESIC_WRAP.SIZE * wrap + GEODESIC_WRAP.PLACES] + WRAP_NUMBERS.SURFACE,
+                wraps[GEODESIC_WRAP.SIZE * wrap + GEODESIC_WRAP.NUMBERS] + WRAP_NUMBERS.SURFACE,
             )
             pose = at(result, slots[GEODESIC_PATH.POSES] + SURFACE_POSE.SIZE * wrap)
-            point = point_in_surface(pose, vector(node_record, NODE_WORK.PLACE))
+            point = point_in_surface(pose, vector(node_record, NODE_WORK.POSITION))
             # The geodesic starts in the direction of the line before it.
             start_direction = rotate_back(
                 pose, vector(work, NODE_WORK.SIZE * int(order[k - 1]) + NODE_WORK.ALONG)
@@ -100,7 +100,7 @@ def trace_cable(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, 
     count = 0
     for k in range(i[CABLE.COUNT]):
         element = at(i, CABLE.ELEMENTS + ELEMENT.SIZE * k)
-        element_record = at(result, element[ELEMENT.KEPT])
+        element_record = at(result, element[ELEMENT.RECORD])
         if element[ELEMENT.IS_OBSTACLE] == 0:
             store_vector(f, 3 * count, vector(element_record, 0))
             count += 1

@@ -55,7 +55,7 @@ from osimlite.mechanics.kernels.paths import (
 )
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 from osimlite.mechanics.kernels.points import place_frame
-from osimlite.mechanics.kernels.segment_depths import count_ways, squared_depth
+from osimlite.mechanics.kernels.segment_depths import count_directions, squared_depth
 from osimlite.mechanics.laws.vectors import (
     Vector,
     cross,
@@ -71,7 +71,7 @@ from osimlite.mechanics.laws.vectors import (
 class GEODESIC_WRAP(metaclass=Record):
     """Integers of a wrap; wraps follow the nodes."""
 
-    PLACES = 0
+    NUMBERS = 0
     """Offset of its numbers, see `geodesic_starts`."""
     FIRST = 1
     """Point at which its segment begins."""
@@ -96,17 +96,17 @@ class GEODESIC_PATH(metaclass=Record):
     """Offset of the poses of the surfaces."""
 
 
-WHOLE = 10.0
+ACTIVE_SIDE_PRIORITY = 10.0
 """Added to the angle of surfaces with an active side, so that they come first (rad)."""
 INSIDE = 1e-14
 """Value of a surface's function above which a point counts as inside, relative to `SURFACE.SQUARE`."""
-WAYS = 16
+MAX_COMBINATIONS = 16
 """Largest number of combinations of directions past open surfaces."""
 NEARLY = 0.97
 """A path is dropped if this part of its length exceeds that of the shortest one."""
 
 
-TURNS = 16
+MAX_CHANGES = 16
 """Largest number of changes of the list of surfaces in a search."""
 
 
@@ -167,12 +167,12 @@ def geodesic_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats
             second_node = at(work, NODE_WORK.SIZE * (node + 1))
             store_vector(
                 first_node,
-                NODE_WORK.PLACE,
+                NODE_WORK.POSITION,
                 vector(slot, OBSTACLE_WORK.GROUND_START + END_NUMBERS.POINT),
             )
             store_vector(
                 second_node,
-                NODE_WORK.PLACE,
+                NODE_WORK.POSITION,
                 vector(slot, OBSTACLE_WORK.GROUND_END + END_NUMBERS.POINT),
             )
             # The second tangent point carries the length on the surface before it.
@@ -180,7 +180,7 @@ def geodesic_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats
                 0.0,
                 slot[OBSTACLE_WORK.CURVE + GEODESIC.ARC],
             )
-            first_node[NODE_WORK.IS_KEPT] = second_node[NODE_WORK.IS_KEPT] = 0.0
+            first_node[NODE_WORK.IS_CACHED] = second_node[NODE_WORK.IS_CACHED] = 0.0
             order[k + 2 * number + 1], order[k + 2 * number + 2] = node, node + 1
     measure_points(model, data, y, item)
     return OUTCOME.OK
@@ -248,11 +248,13 @@ def bend_segment(i: Ints, p: Floats, record: Floats, first_node: int, second_nod
             and poses[SURFACE_POSE.SIZE * number + SURFACE_POSE.HOW] != BENDING.NOT
         ):
             near_count += 1
-    store_vector(chain, 0, vector(work, NODE_WORK.SIZE * first_node + NODE_WORK.PLACE))
+    store_vector(chain, 0, vector(work, NODE_WORK.SIZE * first_node + NODE_WORK.POSITION))
     # `combination` counts combinations of directions past open surfaces, as digits of a mixed radix.
-    best_count, least, combination, stage = 0, inf, 0, SEARCH_STAGE.MEANT
-    while combination < WAYS and near_count > 0:
-        store_vector(chain, SLOT.SIZE, vector(work, NODE_WORK.SIZE * second_node + NODE_WORK.PLACE))
+    best_count, least, combination, stage = 0, inf, 0, SEARCH_STAGE.ACTIVE_SIDE
+    while combination < MAX_COMBINATIONS and near_count > 0:
+        store_vector(
+            chain, SLOT.SIZE, vector(work, NODE_WORK.SIZE * second_node + NODE_WORK.POSITION)
+        )
         count, step = fill_slots(
             i, p, record, first_node, second_node, near_count, combination, stage, least
         )
@@ -264,7 +266,7 @@ def bend_segment(i: Ints, p: Floats, record: Floats, first_node: int, second_nod
         combination += step
         # On an ellipsoid there may be no geodesic near the start, but a shortest one exists; where
         # surfaces intersect, no smooth path may exist, and one surface alone must do.
-        if combination == WAYS and least == inf and stage < SEARCH_STAGE.ALONE:
+        if combination == MAX_COMBINATIONS and least == inf and stage < SEARCH_STAGE.ALONE:
             combination = 0
             stage += 1
     return best_count
@@ -291,7 +293,7 @@ def fill_slots(
         second_node: second point.
         near_count: number of surfaces that may bend the segment.
         combination: number of the combination of directions.
-        stage: MEANT, STRING or ALONE of `SEARCH_STAGE`.
+        stage: ACTIVE_SIDE, STRING or ALONE of `SEARCH_STAGE`.
         least: length of the shortest path so far (m).
 
     Returns:
@@ -300,7 +302,7 @@ def fill_slots(
     """
     size = i[PATH.POINTS] + 2 * i[PATH.WRAPS]
     count = 0
-    step = WAYS
+    step = MAX_COMBINATIONS
     work = at(record, PATH_WORK.ORDER + size)
     wraps = at(i, PATH.NODES_AT + NODE.SIZE * size)
     slots = at(wraps, GEODESIC_WRAP.SIZE * i[PATH.WRAPS])
@@ -312,7 +314,7 @@ def fill_slots(
     # A surface that is passed in another direction needs the others in place before the chain is
     # smoothed.
     waits = False
-    for _ in range(TURNS):
+    for _ in range(MAX_CHANGES):
         previous_count = count
         # A geodesic that has shrunk to nothing does not touch.
         for k in range(count, 0, -1):
@@ -328,7 +330,7 @@ def fill_slots(
                 return count, step
             waits = False
             if slot_index > 0:
-                numbers = at(p, wraps[GEODESIC_WRAP.SIZE * number + GEODESIC_WRAP.PLACES])
+                numbers = at(p, wraps[GEODESIC_WRAP.SIZE * number + GEODESIC_WRAP.NUMBERS])
                 pose = at(poses, SURFACE_POSE.SIZE * number)
                 is_open = (
                     numbers[WRAP_NUMBERS.SIDE] == 0.0
@@ -340,12 +342,13 @@ def fill_slots(
                     # kept from then on.
                     a = node_in_surface(pose, work, first_node)
                     b = node_in_surface(pose, work, second_node)
-                    way_count = min(
-                        count_ways(at(numbers, WRAP_NUMBERS.SURFACE), a, b, near_count == 1), step
+                    direction_count = min(
+                        count_directions(at(numbers, WRAP_NUMBERS.SURFACE), a, b, near_count == 1),
+                        step,
                     )
-                    if way_count > 1:
-                        step //= way_count
-                        which = combination // step % way_count
+                    if direction_count > 1:
+                        step //= direction_count
+                        which = combination // step % direction_count
                         # Directions 2 and 3 are perpendicular to 0 and 1; odd ones are opposite to
                         # even ones.
                         if which > 1:
@@ -393,7 +396,7 @@ def mark_near_wraps(
         wrap_ints = at(wraps, GEODESIC_WRAP.SIZE * number)
         pose = at(record, slots[GEODESIC_PATH.POSES] + SURFACE_POSE.SIZE * number)
         if wrap_ints[GEODESIC_WRAP.FIRST] == first_node:
-            numbers = at(p, wrap_ints[GEODESIC_WRAP.PLACES])
+            numbers = at(p, wrap_ints[GEODESIC_WRAP.NUMBERS])
             surface = at(numbers, WRAP_NUMBERS.SURFACE)
             # An end inside the surface makes OpenSim ignore it.
             largest_value = INSIDE * surface[SURFACE.SQUARE]
@@ -404,7 +407,7 @@ def mark_near_wraps(
                 and surface_value(surface, a) <= largest_value
                 and surface_value(surface, b) <= largest_value
             )
-            pose[SURFACE_POSE.HOW] = BENDING.AS_MEANT if is_near else BENDING.NOT
+            pose[SURFACE_POSE.HOW] = BENDING.ACTIVE_SIDE if is_near else BENDING.NOT
             # Of several segments around one cylinder or torus, only the deepest must obey its side.
             if (
                 is_near
@@ -441,7 +444,7 @@ def node_in_surface(pose: Floats, work: Floats, node: int) -> Vector:
         work: results of the nodes.
         node: number of the node.
     """
-    return point_in_surface(pose, vector(work, NODE_WORK.SIZE * node + NODE_WORK.PLACE))
+    return point_in_surface(pose, vector(work, NODE_WORK.SIZE * node + NODE_WORK.POSITION))
 
 
 def find_largest_turn(
@@ -483,10 +486,10 @@ def find_largest_turn(
             and pose[SURFACE_POSE.HOW] != BENDING.NOT
             and find_slot(chain, count, number) == 0
         ):
-            numbers = at(p, wrap_ints[GEODESIC_WRAP.PLACES])
+            numbers = at(p, wrap_ints[GEODESIC_WRAP.NUMBERS])
             about = vector(pose, SURFACE_POSE.ABOUT)
             surface = at(numbers, WRAP_NUMBERS.SURFACE)
-            priority = WHOLE if numbers[WRAP_NUMBERS.SIDE] != 0.0 else 0.0
+            priority = ACTIVE_SIDE_PRIORITY if numbers[WRAP_NUMBERS.SIDE] != 0.0 else 0.0
             largest_value = INSIDE * surface[SURFACE.SQUARE]
             for k in range(count + 1):
                 a = point_in_surface(pose, line_start(chain, k + 1))

@@ -25,7 +25,7 @@ from math import atan2, cos, inf, pi, sin, sqrt
 from osimlite.mechanics.kernels.cable_surfaces import SURFACE, SURFACE_TYPE, surface_value
 from osimlite.mechanics.kernels.layout import Record
 from osimlite.mechanics.kernels.pointers import Floats, at
-from osimlite.mechanics.kernels.segment_depths import LEAST, nearest_to_ring, way_out
+from osimlite.mechanics.kernels.segment_depths import LEAST, nearest_to_ring, outward_direction
 from osimlite.mechanics.kernels.wrap_cylinder import closest_to_axis
 from osimlite.mechanics.kernels.wrapping import WRAPPING, decide_wrapping, is_on_side
 from osimlite.mechanics.laws.vectors import (
@@ -72,7 +72,7 @@ class BENDING(metaclass=Record):
 
     NOT = 0.0
     """A surface does not bend the segment."""
-    AS_MEANT = 1.0
+    ACTIVE_SIDE = 1.0
     """A surface bends a segment on its active side."""
     ANY_SIDE = 2.0
     """A surface bends a segment on any side where the segment passes through it."""
@@ -99,7 +99,7 @@ def start_on_surface(
         p: numbers of the wrap.
         first: start of the segment.
         second: end of the segment.
-        bending: AS_MEANT, ANY_SIDE or PULLED of `BENDING`.
+        bending: ACTIVE_SIDE, ANY_SIDE or PULLED of `BENDING`.
         about: axis about which the segment turns around a surface without a side, by the right-hand
             rule; zeros for either direction.
         work: workspace of a string.
@@ -112,8 +112,8 @@ def start_on_surface(
             surface[SURFACE.RADIUS], surface[SURFACE.TUBE], first, second, axis, side, bending
         )
     if surface[SURFACE.KIND] == SURFACE_TYPE.CYLINDER:
-        is_held = bending != BENDING.ANY_SIDE and axis < 2
-        side_out = replace_component((0.0, 0.0, 0.0), axis, side if is_held else 0.0)
+        has_side = bending != BENDING.ANY_SIDE and axis < 2
+        side_out = replace_component((0.0, 0.0, 0.0), axis, side if has_side else 0.0)
         return start_on_cylinder(
             surface[SURFACE.RADIUS],
             p[WRAP_NUMBERS.HALF_LENGTH],
@@ -260,7 +260,7 @@ def start_on_ellipsoid(
         second: end of the segment.
         axis: axis of the active side.
         side: sign of the active side, 0.0 for the complete surface.
-        bending: AS_MEANT, ANY_SIDE or PULLED of `BENDING`.
+        bending: ACTIVE_SIDE, ANY_SIDE or PULLED of `BENDING`.
         about: axis about which the segment turns, zeros for either direction.
         work: workspace of a string; filled with beads.
     """
@@ -284,7 +284,7 @@ def start_on_ellipsoid(
     # direction must be searched.
     if p[SURFACE.KIND] == SURFACE_TYPE.ELLIPSOID or norm(cross(middle, scaled_chord)) < LEAST:
         # Of two opposite directions both start at the narrow side.
-        outwards = way_out(
+        outwards = outward_direction(
             radii,
             times(0.0 if norm(about) > 0.0 else 1.0, multiply_elementwise(radii, middle)),
             multiply_elementwise(radii, scaled_chord),
@@ -451,7 +451,7 @@ def start_on_torus(
         second: end of the segment.
         axis: axis of the active side.
         side: sign of the active side, 0.0 for the complete surface.
-        bending: AS_MEANT or ANY_SIDE of `BENDING`.
+        bending: ACTIVE_SIDE or ANY_SIDE of `BENDING`.
     """
     x, y, _ = ring_point = nearest_to_ring(ring, first, second)
     if side != 0.0 and not is_on_side(ring_point, axis, side):

@@ -248,7 +248,7 @@ class CONSTRAINED(metaclass=Record):
     """Offset in data of the prescribed values of G u (m,)."""
     WORK_DRIFTS = next(_at)
     """Offset in data of the required values of G udot (m,)."""
-    WORK_KEPT = next(_at)
+    WORK_COPY = next(_at)
     """Offset in data of workspace for a copy of rows (m, n)."""
     WORK_FACTOR = next(_at)
     """Offset in data of workspace for a factor of (m, n) equations."""
@@ -357,10 +357,10 @@ class PRODUCT(metaclass=Record):
     Attributes:
         ONE, TWO: numbers of the shares.
         ENTRY: entry of the other program's mass matrix by which the product is multiplied.
-        PLACE: offset in data of the entry of the mass matrix that the product is added to.
+        TARGET: offset in data of the entry of the mass matrix that the product is added to.
     """
 
-    ONE, TWO, ENTRY, PLACE, SIZE = range(5)
+    ONE, TWO, ENTRY, TARGET, SIZE = range(5)
 
 
 class EXCESS(metaclass=Record):

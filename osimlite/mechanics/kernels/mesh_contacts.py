@@ -89,9 +89,11 @@ def touch_mesh(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
         )
         if d > 0.0:
             constants = FoundationSpring(spring[0], p[11], p[12], p[13], p[14], p[15])
-            push, turn, stored_energy = spring_load(constants, middle, end, about, v, turning)
-            force = plus(force, push)
-            torque = plus(torque, turn)
+            spring_force, spring_torque, stored_energy = spring_load(
+                constants, middle, end, about, v, turning
+            )
+            force = plus(force, spring_force)
+            torque = plus(torque, spring_torque)
             energy += stored_energy
     apply_mesh_load(model, data, item, about, force, torque, energy)
     return OUTCOME.OK

@@ -84,7 +84,7 @@ _SUMS = tuple(sum((1.0 / k for k in range(1, order + 1)), 0.0) for order in rang
 _ADAMS = (1.0, 1 / 2, 5 / 12, 3 / 8, 251 / 720, 95 / 288, 19087 / 60480, 5257 / 17280)
 PREDICTED = (*_ONES, 0.0, *_ADAMS[:-1])
 """Weight of each difference in the prediction, for both methods."""
-GIVEN = _SUMS + _ONES
+PSI_WEIGHTS = _SUMS + _ONES
 """Weight of each difference in psi, for both methods."""
 ALPHA = (
     *((1.0 - kappa) * total for kappa, total in zip(_KAPPA, _SUMS, strict=True)),
@@ -116,7 +116,7 @@ SHRINK = 0.2
 """Smallest factor of a change of the step."""
 GROW = 8.0
 """Largest factor of a change of the step."""
-WORTH = 1.2
+MIN_GROWTH = 1.2
 """Smallest factor with which a step is made longer."""
 PATIENCE = 3
 """Number of consecutive rejections after which the history is dropped, as the motion has a kink."""
@@ -303,7 +303,7 @@ def predict_state(size: int, method: int, order: int, rows: Floats, y: Floats, p
         y[k], psi[k] = rows[k], 0.0
         for i in range(1, order + 1):
             y[k] += PREDICTED[first + i] * rows[size * i + k]
-            psi[k] += GIVEN[first + i] * rows[size * i + k]
+            psi[k] += PSI_WEIGHTS[first + i] * rows[size * i + k]
         psi[k] /= ALPHA[first + order]
 
 
@@ -433,7 +433,7 @@ def choose_order(
         if result > factor:
             best, factor = candidate, result
     factor = min(safety * factor, GROW)
-    if factor >= WORTH or factor < 1.0:
+    if factor >= MIN_GROWTH or factor < 1.0:
         h[MULTISTEP_WORK.ORDER], h[MULTISTEP_WORK.EQUAL] = float(best), 0.0
         rescale_differences(size, method, h, rows, max(factor, SHRINK))
 

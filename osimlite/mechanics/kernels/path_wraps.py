@@ -97,7 +97,7 @@ def wrapped_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
             result = wrap_surface(
                 model, reals, data, y, f, item, 1 - k if exchanged and k < 2 else k
             )
-            if result == WRAPPING.NOWHERE:
+            if result == WRAPPING.NO_POINTS:
                 measure_points(model, data, y, item)
                 return OUTCOME.OK
             if result == WRAPPING.BEYOND:
@@ -135,9 +135,9 @@ def place_surfaces(model: Ints, reals: Floats, data: Floats, item: int) -> None:
     work = at(data, i[ITEM.RECORD] + PATH_WORK.ORDER + i[PATH.POINTS] + 2 * i[PATH.WRAPS])
     for k in range(i[PATH.WRAPS]):
         number = i[PATH.POINTS] + 2 * k
-        at(work, NODE_WORK.SIZE * number)[NODE_WORK.IS_KEPT] = at(
+        at(work, NODE_WORK.SIZE * number)[NODE_WORK.IS_CACHED] = at(
             work, NODE_WORK.SIZE * (number + 1)
-        )[NODE_WORK.IS_KEPT] = 0.0
+        )[NODE_WORK.IS_CACHED] = 0.0
         back = i[PATH.NODES_AT + NODE.SIZE * nodes + PATH_WRAP.SIZE * k + PATH_WRAP.BACK]
         if back > 0:
             node = at(i, PATH.NODES_AT + NODE.SIZE * number)
@@ -168,12 +168,12 @@ def remove_tangents(model: Ints, data: Floats, item: int, number: int) -> None:
     count = int(result[PATH_WORK.COUNT])
     first = i[PATH.POINTS] + 2 * number
     # Tangent points have the numbers behind those of the points.
-    kept_count = 0
+    remaining_count = 0
     for k in range(count):
         if not first <= order[k] <= first + 1:
-            order[kept_count] = order[k]
-            kept_count += 1
-    result[PATH_WORK.COUNT] = kept_count
+            order[remaining_count] = order[k]
+            remaining_count += 1
+    result[PATH_WORK.COUNT] = remaining_count
 
 
 def wrap_surface(
@@ -194,7 +194,7 @@ def wrap_surface(
         number: index of the PathWrap in the path.
 
     Returns:
-        Result of the last segment that was tried; NOWHERE if no point is in the range, BEYOND if
+        Result of the last segment that was tried; NO_POINTS if no point is in the range, BEYOND if
         the range ends after the last point (`WRAPPING`).
     """
     # The tangent points of an earlier iteration would split the segments.
@@ -228,7 +228,7 @@ def wrap_surface(
             begin = k if begin < 0 else begin
             end = k
     if begin < 0:
-        return WRAPPING.NOWHERE
+        return WRAPPING.NO_POINTS
     code, best_segment, least_increase = WRAPPING.NONE, -1, inf
     first_tangent = at(work, NODE_WORK.SIZE * tangent)
     second_tangent = at(work, NODE_WORK.SIZE * (tangent + 1))
@@ -247,12 +247,12 @@ def wrap_surface(
         store_vector(
             e,
             WRAP_WORK.FIRST_END,
-            point_in_surface(at(e, SURFACE_WORK.POSE), vector(a, NODE_WORK.PLACE)),
+            point_in_surface(at(e, SURFACE_WORK.POSE), vector(a, NODE_WORK.POSITION)),
         )
         store_vector(
             e,
             WRAP_WORK.SECOND_END,
-            point_in_surface(at(e, SURFACE_WORK.POSE), vector(b, NODE_WORK.PLACE)),
+            point_in_surface(at(e, SURFACE_WORK.POSE), vector(b, NODE_WORK.POSITION)),
         )
         code = call(model[surface + ITEM.LAW], model, reals, data, y, f, surface)
         if code < WRAPPING.WRAPPED:
@@ -276,8 +276,8 @@ def wrap_surface(
             )
         if length_increase < least_increase:
             best_segment, least_increase = k, length_increase
-            store_vector(first_tangent, NODE_WORK.PLACE, first_tangent_point)
-            store_vector(second_tangent, NODE_WORK.PLACE, second_tangent_point)
+            store_vector(first_tangent, NODE_WORK.POSITION, first_tangent_point)
+            store_vector(second_tangent, NODE_WORK.POSITION, second_tangent_point)
             first_tangent[NODE_WORK.SURFACE], second_tangent[NODE_WORK.SURFACE] = (
                 0.0,
                 e[WRAP_WORK.SURFACE_LENGTH],
@@ -288,7 +288,7 @@ def wrap_surface(
         if code == WRAPPING.MANDATORY:
             break
     # The tangent points are NaN where OpenSim finds none.
-    if best_segment >= 0 and first_tangent[NODE_WORK.PLACE] == first_tangent[NODE_WORK.PLACE]:
+    if best_segment >= 0 and first_tangent[NODE_WORK.POSITION] == first_tangent[NODE_WORK.POSITION]:
         for k in range(count - 1, best_segment, -1):
             order[k + 2] = order[k]
         order[best_segment + 1], order[best_segment + 2] = tangent, tangent + 1

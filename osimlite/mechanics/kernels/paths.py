@@ -107,9 +107,9 @@ class NODE_NUMBERS(metaclass=Record):
 class NODE_WORK(metaclass=Record):
     """Results of a node, in ground."""
 
-    PLACE = 0
+    POSITION = 0
     """Position in ground (m)."""
-    KEPT = 3
+    CACHED_POSITION = 3
     """Position of a tangent point for straight lines, once it is used, see `path_wraps`."""
     ALONG = 6
     """Unit vector to the next node."""
@@ -117,8 +117,8 @@ class NODE_WORK(metaclass=Record):
     """Derivative of a moving point's position by the coordinate, in ground."""
     SURFACE = 9
     """Length on the surface before a tangent point (m)."""
-    IS_KEPT = 10
-    """1.0 if a tangent point has a KEPT position, else 0.0."""
+    IS_CACHED = 10
+    """1.0 if the position of a tangent point is cached, else 0.0."""
     SIZE = 12
     """Length of the results of a node."""
 
@@ -252,7 +252,7 @@ def place_points(model: Ints, reals: Floats, data: Floats, y: Floats, item: int)
                     NODE_WORK.GRADIENT,
                     direction(model, data, node[NODE.LINK], rotate(t, (dx, dy, dz))),
                 )
-        store_vector(node_record, NODE_WORK.PLACE, station(model, data, node[NODE.LINK], point))
+        store_vector(node_record, NODE_WORK.POSITION, station(model, data, node[NODE.LINK], point))
         order[count] = number
         count += 1
     result[PATH_WORK.COUNT] = count
@@ -298,8 +298,14 @@ def measure_points(model: Ints, data: Floats, y: Floats, item: int) -> float:
             or m[NODE.KIND] >= NODE_TYPE.MOVING
             or n[NODE.KIND] >= NODE_TYPE.MOVING
         ):
-            moves = minus(node_velocity(model, data, y, n, b), node_velocity(model, data, y, m, a))
-            speed += norm(moves) if distance < COINCIDENT else dot(moves, line) / distance
+            relative_velocity = minus(
+                node_velocity(model, data, y, n, b), node_velocity(model, data, y, m, a)
+            )
+            speed += (
+                norm(relative_velocity)
+                if distance < COINCIDENT
+                else dot(relative_velocity, line) / distance
+            )
         # Forces along a segment without direction vanish, where OpenSim has NaN.
         store_vector(
             a, NODE_WORK.ALONG, times(0.0 if distance < SIGNIFICANT else 1.0 / distance, line)
@@ -318,11 +324,13 @@ def line_end(node: Ints, node_record: Floats) -> Vector:
         node_record: results of the node; a tangent point is cached.
     """
     if node[NODE.KIND] != NODE_TYPE.TANGENT:
-        return vector(node_record, NODE_WORK.PLACE)
-    if node_record[NODE_WORK.IS_KEPT] == 0.0:
-        store_vector(node_record, NODE_WORK.KEPT, vector(node_record, NODE_WORK.PLACE))
-        node_record[NODE_WORK.IS_KEPT] = 1.0
-    return vector(node_record, NODE_WORK.KEPT)
+        return vector(node_record, NODE_WORK.POSITION)
+    if node_record[NODE_WORK.IS_CACHED] == 0.0:
+        store_vector(
+            node_record, NODE_WORK.CACHED_POSITION, vector(node_record, NODE_WORK.POSITION)
+        )
+        node_record[NODE_WORK.IS_CACHED] = 1.0
+    return vector(node_record, NODE_WORK.CACHED_POSITION)
 
 
 def node_velocity(model: Ints, data: Floats, y: Floats, node: Ints, node_record: Floats) -> Vector:
@@ -337,7 +345,7 @@ def node_velocity(model: Ints, data: Floats, y: Floats, node: Ints, node_record:
         node: integers of the node.
         node_record: results of the node.
     """
-    v = velocity(model, data, node[NODE.LINK], vector(node_record, NODE_WORK.PLACE))
+    v = velocity(model, data, node[NODE.LINK], vector(node_record, NODE_WORK.POSITION))
     if NODE_TYPE.MOVING <= node[NODE.KIND] <= NODE_TYPE.CLAMPED and node[NODE.OF] >= 0:
         return add_scaled(
             v, y[model[MODEL.DOFS] + node[NODE.OF]], vector(node_record, NODE_WORK.GRADIENT)
@@ -378,7 +386,7 @@ def pull_points(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, 
         if k < last_node and nodes[NODE.SIZE * int(order[k + 1]) + NODE.BODY] != node[NODE.BODY]:
             pull = times(tension, vector(node_record, NODE_WORK.ALONG))
         force = minus(pull, back)
-        apply_force(model, data, node[NODE.LINK], vector(node_record, NODE_WORK.PLACE), force)
+        apply_force(model, data, node[NODE.LINK], vector(node_record, NODE_WORK.POSITION), force)
         # A moving point does work along its coordinate, even within its link.
         if NODE_TYPE.MOVING <= node[NODE.KIND] <= NODE_TYPE.CLAMPED and node[NODE.OF] >= 0:
             f[model[MODEL.DOFS] + node[NODE.OF]] += dot(

@@ -43,14 +43,14 @@ def register_law(law: Law) -> int:
     return id(law)
 
 
-def at(vector: Vector, place: int) -> Vector:
+def at(vector: Vector, offset: int) -> Vector:
     """Return the vector from an offset on, as a view.
 
     Args:
         vector: array of numbers.
-        place: offset of the first entry of the view.
+        offset: offset of the first entry of the view.
     """
-    return vector[place:]
+    return vector[offset:]
 
 
 def call(

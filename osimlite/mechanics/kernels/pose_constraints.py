@@ -48,8 +48,8 @@ def fulfil_constraints(m: Fit, y: Floats) -> bool:
         if resolved[k] == FREEDOM.VARIABLE or resolved[k] >= FREEDOM.AT_END:
             y[k] = min(max(y[k], ranges[2 * k]), ranges[2 * k + 1])
     values = at(v, p[FIT.MEASURED] + 3 * p[FIT.MARKERS] + 9 * p[FIT.SENSORS] + p[FIT.GOALS])
-    for k in range(p[FIT.HELD]):
-        y[p[p[FIT.HELD_AT] + k]] = values[k]
+    for k in range(p[FIT.PRESCRIBED]):
+        y[p[p[FIT.PRESCRIBED_AT] + k]] = values[k]
     set_dependents(m, y)
     return count_equations(m) == 0 or restore_equations(m, y)
 

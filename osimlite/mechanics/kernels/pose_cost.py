@@ -67,12 +67,12 @@ def evaluate_cost(m: Fit, y: Floats) -> float:
         stiffness[k] = bend[k] = 0.0
     for link in range(model[MODEL.LINKS]):
         link_sums = at(link_work(model, data, link), LINK_WORK.INERTIA)
-        turned = at(v, p[FIT.TURNED] + 9 * link)
+        moments = at(v, p[FIT.MOMENTS] + 9 * link)
         # Inertia and wrench of each link collect masses and forces of springs.
         for k in range(16):
             link_sums[k] = 0.0
         for k in range(9):
-            turned[k] = 0.0
+            moments[k] = 0.0
     value = add_markers(m) + add_sensors(m)
     gather_derivatives(m, y)
     goals = 3 * p[FIT.MARKERS] + 9 * p[FIT.SENSORS]
@@ -153,7 +153,7 @@ def add_markers(m: Fit) -> float:
         link_record = link_work(model, data, link)
         i = at(link_record, LINK_WORK.INERTIA)
         load = at(link_record, LINK_WORK.WRENCH)
-        turned = at(v, p[FIT.TURNED] + 9 * link)
+        moments = at(v, p[FIT.MOMENTS] + 9 * link)
         pull = times(weight, deviation)
         arm = minus(point, vector(link_record, LINK_WORK.ORIGIN))
         a, b, c = arm
@@ -173,9 +173,9 @@ def add_markers(m: Fit) -> float:
         store_vector(load, 3, plus(vector(load, 3), pull))
         # Sums of force times arm, by rows; with them a displacement of the arms changes the moment.
         px, py, pz = pull
-        store_vector(turned, 0, plus(vector(turned, 0), times(px, arm)))
-        store_vector(turned, 3, plus(vector(turned, 3), times(py, arm)))
-        store_vector(turned, 6, plus(vector(turned, 6), times(pz, arm)))
+        store_vector(moments, 0, plus(vector(moments, 0), times(px, arm)))
+        store_vector(moments, 3, plus(vector(moments, 3), times(py, arm)))
+        store_vector(moments, 6, plus(vector(moments, 6), times(pz, arm)))
     return value
 
 
@@ -198,7 +198,7 @@ def gather_derivatives(m: Fit, y: Floats) -> None:
         link_record = link_work(model, data, link)
         i = at(link_record, LINK_WORK.INERTIA)
         load = at(link_record, LINK_WORK.WRENCH)
-        turned = at(v, p[FIT.TURNED] + 9 * link)
+        moments = at(v, p[FIT.MOMENTS] + 9 * link)
         # A subtree without measurements contributes nothing.
         if i[0] > 0.0 or i[4] > 0.0:
             for freedom in range(j[LINK.FIRST_DOF], j[LINK.END_DOF]):
@@ -208,7 +208,7 @@ def gather_derivatives(m: Fit, y: Floats) -> None:
                 # As in the composite-rigid-body algorithm: the Gauss-Newton matrix is a mass
                 # matrix.
                 angular, linear = spatial_momentum(i, turn, shift)
-                carried = displaced_moment(load, turned, turn, shift)
+                carried = displaced_moment(load, moments, turn, shift)
                 k = freedom
                 while k >= 0:
                     c = at(columns, 6 * k)
@@ -221,15 +221,15 @@ def gather_derivatives(m: Fit, y: Floats) -> None:
                             vector(c, 0), carried
                         )
                     k = freedoms[DOF.SIZE * k + DOF.ABOVE]
-            add_joint_curvature(m, y, link, load, turned)
+            add_joint_curvature(m, y, link, load, moments)
         if j[LINK.PARENT] >= 0:
             parent_sums = at(link_work(model, data, j[LINK.PARENT]), LINK_WORK.INERTIA)
             # Inertia (10) and wrench (6) are adjacent, and both are summed.
             for k in range(16):
                 parent_sums[k] += i[k]
-            parent_sums = at(v, p[FIT.TURNED] + 9 * j[LINK.PARENT])
+            parent_sums = at(v, p[FIT.MOMENTS] + 9 * j[LINK.PARENT])
             for k in range(9):
-                parent_sums[k] += turned[k]
+                parent_sums[k] += moments[k]
 
 
 def apply_couplers(m: Fit, y: Floats) -> None:

@@ -29,27 +29,27 @@ from osimlite.mechanics.laws.vectors import (
 from osimlite.mechanics.laws.vectors import rotate as turned_by
 
 
-def displaced_moment(load: Floats, turned: Floats, turn: Vector, shift: Vector) -> Vector:
+def displaced_moment(load: Floats, moments: Floats, turn: Vector, shift: Vector) -> Vector:
     """Return the moment of the springs' forces at arms that a motion displaces.
 
     It is the sum over the springs of (shift + turn x arm) x force.
 
     Args:
         load: sum of moments and forces (6,).
-        turned: sum of forces times arms (3, 3).
+        moments: sum of forces times arms (3, 3).
         turn: angular part of the motion.
         shift: linear part of the motion.
     """
     # Sum of arm (force . turn) - turn (arm . force), written with the matrix of forces times arms.
-    trace = turned[0] + turned[4] + turned[8]
+    trace = moments[0] + moments[4] + moments[8]
     x, y, z = turn
     result = add_scaled(
-        add_scaled(times(x, vector(turned, 0)), y, vector(turned, 3)), z, vector(turned, 6)
+        add_scaled(times(x, vector(moments, 0)), y, vector(moments, 3)), z, vector(moments, 6)
     )
     return add_scaled(plus(cross(shift, vector(load, 3)), result), -trace, turn)
 
 
-def add_joint_curvature(m: Fit, y: Floats, link: int, load: Floats, turned: Floats) -> None:
+def add_joint_curvature(m: Fit, y: Floats, link: int, load: Floats, moments: Floats) -> None:
     """Add to the Hessian the contribution of the axes of one joint.
 
     Args:
@@ -57,13 +57,13 @@ def add_joint_curvature(m: Fit, y: Floats, link: int, load: Floats, turned: Floa
         y: state.
         link: link of the joint.
         load: sum of moments and forces on the subtree of the link.
-        turned: sum of forces times arms on the subtree.
+        moments: sum of forces times arms on the subtree.
     """
     p = m.p
     axis_ranges = at(p, p[FIT.AXES_AT])
     for outer_axis in range(axis_ranges[link], axis_ranges[link + 1]):
         turn, shift = axis_column(m, y, link, outer_axis)
-        carried = displaced_moment(load, turned, turn, shift)
+        carried = displaced_moment(load, moments, turn, shift)
         # An axis carries itself and those after it.
         for inner_axis in range(axis_ranges[link], outer_axis + 1):
             around, _ = axis_column(m, y, link, inner_axis)

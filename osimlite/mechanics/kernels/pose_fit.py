@@ -50,7 +50,7 @@ UNSEEN = 1.0
 """Status of a frame without measurements, which has the previous pose."""
 STUCK = 2.0
 """Status of a frame whose search ended before it converged."""
-APART = 3.0
+UNASSEMBLED = 3.0
 """Status of a frame with no pose near the previous one that fulfils the constraints."""
 FINEST = 1e-9
 """Accuracy of the coordinates, as estimated from the decrease of the steps (rad or m)."""
@@ -64,7 +64,7 @@ FIRST_DAMPING = 1e-4
 """Damping of the first step that is to be short."""
 VAGUE = 1e-7
 """Smallest damping where several poses fit alike."""
-ALIKE = 1e-7
+MIN_PIVOT = 1e-7
 """Smallest pivot relative to the stiffness with which no poses fit alike."""
 SMALL_STEPS = 1e-2
 """Damping of the first step of a descent by small steps."""
@@ -105,7 +105,7 @@ def fit_frames(
     m = Fit(model, reals, data, f, p, c, v)
     size, markers, sensors = model[MODEL.DOFS], p[FIT.MARKERS], p[FIT.SENSORS]
     width = size + 3 * (markers + sensors) + 3
-    input_size = 3 * markers + 9 * sensors + p[FIT.GOALS] + p[FIT.HELD]
+    input_size = 3 * markers + 9 * sensors + p[FIT.GOALS] + p[FIT.PRESCRIBED]
     for number in range(count):
         result = at(results, width * number)
         copy_numbers(input_size, at(frames, input_size * number), at(v, p[FIT.MEASURED]))
@@ -148,7 +148,7 @@ def fit_frame(m: Fit, y: Floats) -> tuple[float, int, float]:
         copy_numbers(size, last_pose, y)
     if not fulfil_constraints(m, y):
         evaluate_pose(m, y)
-        return inf, 0, APART
+        return inf, 0, UNASSEMBLED
     if not has_measurements:
         evaluate_pose(m, y)
         return 0.0, 0, UNSEEN
@@ -275,7 +275,7 @@ def update_measured_pattern(m: Fit, y: Floats) -> None:
         v[p[FIT.STEP] + k] = 0.0
     # A Gauss-Newton matrix that is singular leaves some direction undetermined.
     pattern[count] = (
-        1.0 if solve_free(m, list_free_coordinates(m), LIGHTEST, 0.0, ALIKE) < 0 else 0.0
+        1.0 if solve_free(m, list_free_coordinates(m), LIGHTEST, 0.0, MIN_PIVOT) < 0 else 0.0
     )
 
 
@@ -429,8 +429,8 @@ def descend_to_minimum(
         for k in range(size):
             length = max(length, abs(step[k]))
             start[k] = y[k] + step[k]
-        is_settled = fulfil_constraints(m, start)
-        new = evaluate_cost(m, start) if is_settled else inf
+        is_assembled = fulfil_constraints(m, start)
+        new = evaluate_cost(m, start) if is_assembled else inf
         # For tiny steps rounding hides whether the cost decreases.
         if new <= value or (length <= 1e-6 and new <= value * (1.0 + 1e-9) + 1e-24):
             copy_numbers(size, start, y)

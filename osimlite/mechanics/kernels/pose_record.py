@@ -19,7 +19,7 @@ class FIT(metaclass=Record):
     """Number of orientation sensors."""
     GOALS = 2
     """Number of coordinates with a measured value."""
-    HELD = 3
+    PRESCRIBED = 3
     """Number of coordinates with a prescribed value."""
     COUPLERS = 4
     """Number of couplers."""
@@ -31,7 +31,7 @@ class FIT(metaclass=Record):
     """Offset of the links of the sensors."""
     GOAL_AT = 8
     """Offset of the degrees of freedom of the goals."""
-    HELD_AT = 9
+    PRESCRIBED_AT = 9
     """Offset of the degrees of freedom with prescribed values."""
     COUPLER_AT = 10
     """Offset of the offsets of the couplers' records."""
@@ -57,7 +57,7 @@ class FIT(metaclass=Record):
     """Offset of the Gauss-Newton part of the Hessian (n, n)."""
     BEND = 19
     """Offset of the remaining part of the Hessian (n, n)."""
-    TURNED = 20
+    MOMENTS = 20
     """Offset of the sums of forces times arms of each link (3, 3)."""
     ROWS = 21
     """Offset of the derivatives of the equations by the coordinates (m, n)."""
@@ -90,7 +90,7 @@ class FREEDOM(metaclass=Record):
 
     VARIABLE = 0
     """Free degree of freedom."""
-    GIVEN = 1
+    PRESCRIBED = 1
     """Degree of freedom with a prescribed value."""
     DEPENDENT = 2
     """Degree of freedom that is a function of others."""

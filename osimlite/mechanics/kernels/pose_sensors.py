@@ -62,7 +62,7 @@ def add_sensors(m: Fit) -> float:
         link_record = link_work(model, data, link)
         i = at(link_record, LINK_WORK.INERTIA)
         load = at(link_record, LINK_WORK.WRENCH)
-        turned = at(v, p[FIT.TURNED] + 9 * link)
+        moments = at(v, p[FIT.MOMENTS] + 9 * link)
         # Symmetric part of the derivative of the spring's torque: weight (1 + c [phi]^2).
         x, y, z = times(weight * squared_factor(sqrt(square)), deviation)
         a, b, c = deviation
@@ -75,9 +75,9 @@ def add_sensors(m: Fit) -> float:
         store_vector(load, 0, add_scaled(vector(load, 0), weight, deviation))
         # Antisymmetric part, weight [phi] / 2, which belongs to the sums of forces times arms.
         a, b, c = times(0.5 * weight, deviation)
-        store_vector(turned, 0, plus(vector(turned, 0), (0.0, -c, b)))
-        store_vector(turned, 3, plus(vector(turned, 3), (c, 0.0, -a)))
-        store_vector(turned, 6, plus(vector(turned, 6), (-b, a, 0.0)))
+        store_vector(moments, 0, plus(vector(moments, 0), (0.0, -c, b)))
+        store_vector(moments, 3, plus(vector(moments, 3), (c, 0.0, -a)))
+        store_vector(moments, 6, plus(vector(moments, 6), (-b, a, 0.0)))
     return value
 
 

@@ -152,14 +152,14 @@ def find_step(m: Fit, y: Floats, damping: float, bends: bool) -> bool:
             return True
 
 
-def solve_free(m: Fit, free: int, damping: float, bent: float, smallest: float) -> int:
+def solve_free(m: Fit, free: int, damping: float, curvature_factor: float, smallest: float) -> int:
     """Compute the step of the free coordinates, after that of the coordinates at ends of ranges.
 
     Args:
         m: inputs and workspace of the fit.
         free: number of free coordinates.
         damping: damping of the step.
-        bent: factor of the part of the Hessian beyond Gauss-Newton.
+        curvature_factor: factor of the part of the Hessian beyond Gauss-Newton.
         smallest: smallest pivot relative to the stiffness.
 
     Returns:
@@ -187,13 +187,13 @@ def solve_free(m: Fit, free: int, damping: float, bent: float, smallest: float) 
         constraint_row = at(v, p[FIT.CURVES] + (size * freedom if count > 0 else 0))
         for j in range(size):
             if p[p[FIT.RESOLVED_AT] + j] == FREEDOM.AT_END:
-                total -= (row[j] + bent * bend_row[j]) * step[j]
+                total -= (row[j] + curvature_factor * bend_row[j]) * step[j]
         solution[k] = total
         for j in range(free):
             column = p[p[FIT.FREE_AT] + j]
-            matrix[free * k + j] = row[column] + bent * bend_row[column]
+            matrix[free * k + j] = row[column] + curvature_factor * bend_row[column]
             if count > 0:
-                matrix[free * k + j] += bent * constraint_row[column]
+                matrix[free * k + j] += curvature_factor * constraint_row[column]
         # Levenberg-Marquardt damping relative to the stiffness, plus a part for coordinates without
         # any.
         matrix[free * k + k] += damping * (row[freedom] + SOFTEST)

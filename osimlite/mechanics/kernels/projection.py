@@ -119,7 +119,7 @@ def project_values(
     size = model[MODEL.DOFS]
     h = at(model, model[MODEL.CONSTRAINED])
     count = h[CONSTRAINED.POSITIONS]
-    jacobian = at(data, h[CONSTRAINED.WORK_KEPT])
+    jacobian = at(data, h[CONSTRAINED.WORK_COPY])
     factor = at(data, h[CONSTRAINED.WORK_FACTOR])
     errors = at(data, h[CONSTRAINED.WORK_SYSTEM])
     work = at(errors, count)

@@ -41,7 +41,7 @@ TIME_OF_EVENT = 1e-9
 class COUNTS(metaclass=Record):
     """Counts of a run."""
 
-    TAKEN = 0
+    ACCEPTED = 0
     """Number of accepted steps."""
     ATTEMPTED = 1
     """Number of tried steps."""

@@ -65,7 +65,7 @@ class NOISE(metaclass=Record):
     """Random numbers for sensors."""
 
 
-WORD = 0xFFFFFFFF
+MASK_32 = 0xFFFFFFFF
 """Mask of 32 bits."""
 
 
@@ -74,7 +74,7 @@ class REFLEXES(metaclass=Record):
 
     Attributes:
         TERMS, GATES: numbers of terms and of gates.
-        KEPT, SENSORS: number of control steps that are remembered, and of sensors.
+        HISTORY_LENGTH, SENSORS: number of control steps that are remembered, and of sensors.
         HAS_STATES: whether legs have states.
         SWINGS_FROM_STANCE: whether a leg may go from stance to swing directly.
         NUMBERS, MEMORY_SIZE: lengths of the numbers and of the memory of a candidate.
@@ -85,7 +85,7 @@ class REFLEXES(metaclass=Record):
     (
         TERMS,
         GATES,
-        KEPT,
+        HISTORY_LENGTH,
         SENSORS,
         HAS_STATES,
         SWINGS_FROM_STANCE,
@@ -144,7 +144,7 @@ def record_sensors(
         history: ring buffer of sensors; changed.
     """
     sensors = i[REFLEXES.SENSORS]
-    newest = at(history, sensors * (frames % i[REFLEXES.KEPT]))
+    newest = at(history, sensors * (frames % i[REFLEXES.HISTORY_LENGTH]))
     sources = at(i, REFLEXES.HEAD + TERM.SIZE * i[REFLEXES.TERMS] + OF_GATE * i[REFLEXES.GATES])
     for k in range(sensors):
         newest[k] = read_source(model, data, at(sources, SOURCE.SIZE * k), p, row)
@@ -188,20 +188,20 @@ def interpolate_sensor(i: Ints, frames: int, history: Floats, sensor: int, delay
     full_frames = floor(delay_frames + NEAR)
     fraction = min(max(delay_frames - full_frames, 0.0), 1.0)
     frame = int(latest - full_frames)
-    size, width = i[REFLEXES.KEPT], i[REFLEXES.SENSORS]
+    size, width = i[REFLEXES.HISTORY_LENGTH], i[REFLEXES.SENSORS]
     value = history[width * (frame % size) + sensor]
-    # The ring buffer holds KEPT rows, the newest one at frames - 1.
+    # The ring buffer holds HISTORY_LENGTH rows, the newest one at frames - 1.
     earlier_value = history[width * (max(frame - 1, 0) % size) + sensor]
     return value + fraction * (earlier_value - value)
 
 
 def update_leg_states(
-    senses: Ints, i: Ints, p: Floats, frames: int, row: Floats, history: Floats, legs: Floats
+    sensor_plan: Ints, i: Ints, p: Floats, frames: int, row: Floats, history: Floats, legs: Floats
 ) -> None:
     """Advance the states of two legs by one control step.
 
     Args:
-        senses: plan of the sensor row.
+        sensor_plan: plan of the sensor row.
         i: integers of the reflexes.
         p: numbers of the reflexes.
         frames: number of sensor rows.
@@ -212,7 +212,7 @@ def update_leg_states(
     # Loads are the first two sensors, and are delayed like all others.
     first_load = interpolate_sensor(i, frames, history, 0, p[0])
     second_load = interpolate_sensor(i, frames, history, 1, p[0])
-    first_lead, second_lead = foot_lead(senses, row, 0), foot_lead(senses, row, 1)
+    first_lead, second_lead = foot_lead(sensor_plan, row, 0), foot_lead(sensor_plan, row, 1)
     first_limits = at(p, 1)
     second_limits = at(p, 1 + LIMITS.OF_LEG)
     is_direct = i[REFLEXES.SWINGS_FROM_STANCE] > 0
@@ -369,11 +369,11 @@ def draw_normal(seed: int, purpose: int, step: int, number: int) -> float:
     """
     # A counter-based generator: noise depends on step and number only, not on the order of calls.
     first_word, second_word = philox(
-        int(step) & WORD, int(number), purpose, 0, seed & WORD, (seed >> 32) & WORD
+        int(step) & MASK_32, int(number), purpose, 0, seed & MASK_32, (seed >> 32) & MASK_32
     )
     # Add 1 to the first word, since the logarithm of 0 is infinite.
-    return sqrt(-2.0 * log((first_word + 1.0) / (WORD + 1.0))) * cos(
-        2.0 * pi * second_word / (WORD + 1.0)
+    return sqrt(-2.0 * log((first_word + 1.0) / (MASK_32 + 1.0))) * cos(
+        2.0 * pi * second_word / (MASK_32 + 1.0)
     )
 
 
@@ -395,9 +395,12 @@ def philox(a: int, b: int, c: int, d: int, first_key: int, second_key: int) -> t
     """
     for _ in range(10):
         first_product, second_product = 0xD2511F53 * a, 0xCD9E8D57 * c
-        a = ((second_product >> 32) & WORD) ^ b ^ first_key
-        b = second_product & WORD
-        c = ((first_product >> 32) & WORD) ^ d ^ second_key
-        d = first_product & WORD
-        first_key, second_key = (first_key + 0x9E3779B9) & WORD, (second_key + 0xBB67AE85) & WORD
+        a = ((second_product >> 32) & MASK_32) ^ b ^ first_key
+        b = second_product & MASK_32
+        c = ((first_product >> 32) & MASK_32) ^ d ^ second_key
+        d = first_product & MASK_32
+        first_key, second_key = (
+            (first_key + 0x9E3779B9) & MASK_32,
+            (second_key + 0xBB67AE85) & MASK_32,
+        )
     return a, b

@@ -69,14 +69,14 @@ def _divide_by_gamma(row: tuple[float, ...]) -> tuple[float, ...]:
     """Return a row times the inverse of GAMMA."""
     result = [0.0] * STAGES
     for j in range(STAGES - 1, -1, -1):
-        known_sum = sum(result[i] * GAMMA[i][j] for i in range(j + 1, STAGES))
-        result[j] = (row[j] - known_sum) / DIAGONAL
+        later_sum = sum(result[i] * GAMMA[i][j] for i in range(j + 1, STAGES))
+        result[j] = (row[j] - later_sum) / DIAGONAL
     return tuple(result)
 
 
 UNIT = tuple(tuple(float(i == j) for j in range(STAGES)) for i in range(STAGES))
 """Unit matrix."""
-PLACES = tuple(value for row in ALPHA for value in _divide_by_gamma(row))
+STAGE_STATES = tuple(value for row in ALPHA for value in _divide_by_gamma(row))
 """ALPHA times the inverse of GAMMA, by rows.
 
 In terms of the transformed stages no product with J occurs (E. Hairer, G. Wanner, Solving Ordinary
@@ -97,7 +97,7 @@ SHRINK = 0.2
 """Smallest factor of a change of the step."""
 GROW = 5.0
 """Largest factor of a change of the step."""
-WORTH = 1.1
+MIN_GROWTH = 1.1
 """Smallest factor with which a step is made longer."""
 
 
@@ -163,7 +163,7 @@ def rosenbrock(
         )
         return OUTCOME.OK
     h[METHOD_WORK.REACHED], h[ROSENBROCK_WORK.IS_NEW] = t1, 0.0
-    if factor < 1.0 or (factor >= WORTH and not cut):
+    if factor < 1.0 or (factor >= MIN_GROWTH and not cut):
         h[METHOD_WORK.NEXT_STEP] = min(factor, GROW) * step
     return OUTCOME.OK
 
@@ -207,7 +207,7 @@ def compute_stages(
             for k in range(size):
                 y[k] = y0[k]
                 for j in range(i):
-                    y[k] += PLACES[STAGES * i + j] * stages[size * j + k]
+                    y[k] += STAGE_STATES[STAGES * i + j] * stages[size * j + k]
             data[WORK.TIME] = t0 + TIMES[i] * step
             if call(
                 model[MODEL.LAWS], model, reals, data, y, f, STAGE.ACCELERATION

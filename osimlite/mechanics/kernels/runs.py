@@ -146,15 +146,15 @@ def integrate_run(m: Motion, y: Floats, is_going: bool) -> int:
     previous_levels = at(work, STATES * size)
     next_levels = at(previous_levels, model[MODEL.CONTACTS] + sizes[RUN_SIZES.WATCHES])
     # The caller says whether the initial state fulfils the constraints; else project it.
-    is_kept = model[MODEL.CONSTRAINED] == 0 or sizes[RUN_SIZES.START_HOLDS] > 0
-    if not is_kept and not project_by_law(
+    holds_constraints = model[MODEL.CONSTRAINED] == 0 or sizes[RUN_SIZES.START_HOLDS] > 0
+    if not holds_constraints and not project_by_law(
         model, m.reals, m.data, clock[0], y, f0, 0, h[METHOD_WORK.ACCEPTED] / 10.0, inf
     ):
         return ENDING.FAILED
     copy_numbers(size, y, y0)
     status = OUTCOME.OK if is_going else evaluate_state(m, clock[0], y0, f0, STAGE.ACCELERATION)
     # A run that continues keeps the memory of its method.
-    if counts[COUNTS.TAKEN] == 0 and counts[COUNTS.EVALUATIONS] == 0:
+    if counts[COUNTS.ACCEPTED] == 0 and counts[COUNTS.EVALUATIONS] == 0:
         counts[COUNTS.EVALUATIONS], h[METHOD_WORK.MEMORY] = 0 if is_going else 1, 0.0
     if status != OUTCOME.OK or not is_finite(size, f0):
         return ENDING.FAILED
@@ -187,7 +187,7 @@ def integrate_run(m: Motion, y: Floats, is_going: bool) -> int:
             clock[1] = max(0.1 * (t1 - t0), shortest_step(t0, counts[COUNTS.ATTEMPTED]))
             h[METHOD_WORK.MEMORY] = 0.0
             continue
-        counts[COUNTS.TAKEN] += 1
+        counts[COUNTS.ACCEPTED] += 1
         clock[0] = t1
         note_peaks(m, t1)
         if sizes[RUN_SIZES.MOST_LOGGED] > 0:

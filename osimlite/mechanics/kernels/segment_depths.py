@@ -31,13 +31,13 @@ STEPS = 6
 """Number of Newton steps that refine this point."""
 NEAR_MIDDLE = 0.3
 """Depth (see `squared_depth`) below which a line passes near the middle of a sphere."""
-WAYS = 16
+DIRECTIONS = 16
 """Number of directions across a line that are tried on an ellipsoid."""
 WORTHWHILE = 1.5
 """Largest ratio of depths with which the second best direction is tried."""
 
 
-def count_ways(p: Floats, first: Vector, second: Vector, is_alone: bool) -> int:
+def count_directions(p: Floats, first: Vector, second: Vector, is_alone: bool) -> int:
     """Return the number of directions in which a line through an open surface is bent in turn.
 
     Around a single surface there is a second one only on an ellipsoid. Among others, each is passed on
@@ -64,13 +64,13 @@ def count_ways(p: Floats, first: Vector, second: Vector, is_alone: bool) -> int:
         dot(multiply_elementwise(weights, chord), chord), LEAST
     )
     x, y, z = weights
-    second_way_out = way_out(
+    second_direction = outward_direction(
         (sqrt(1.0 / x), sqrt(1.0 / y), sqrt(1.0 / z)),
         add_scaled(first, fraction, chord),
         chord,
         WORTHWHILE,
     )
-    return 2 if dot(second_way_out, second_way_out) > 0.0 else 1
+    return 2 if dot(second_direction, second_direction) > 0.0 else 1
 
 
 def squared_depth(p: Floats, first: Vector, second: Vector) -> float:
@@ -100,7 +100,7 @@ def squared_depth(p: Floats, first: Vector, second: Vector) -> float:
     )
 
 
-def way_out(radii: Vector, middle: Vector, chord: Vector, deeper: float) -> Vector:
+def outward_direction(radii: Vector, middle: Vector, chord: Vector, deeper: float) -> Vector:
     """Return the direction across a line in which it is least deep in an ellipsoid, a unit vector.
 
     Args:
@@ -123,14 +123,14 @@ def way_out(radii: Vector, middle: Vector, chord: Vector, deeper: float) -> Vect
     best = second = (inf, 0.0)
     previous_depth = line_depth(aa, ab, bb, ma, mb, -2)
     this_depth = line_depth(aa, ab, bb, ma, mb, -1)
-    for k in range(WAYS):
+    for k in range(DIRECTIONS):
         next_depth = line_depth(aa, ab, bb, ma, mb, k)
         if this_depth < previous_depth and this_depth <= next_depth:
             result = (
                 this_depth,
                 2.0
                 * pi
-                / WAYS
+                / DIRECTIONS
                 * (
                     k
                     - 1
@@ -164,7 +164,7 @@ def line_depth(aa: float, ab: float, bb: float, ma: float, mb: float, k: int) ->
         mb: scalar product of m and b.
         k: number of the direction.
     """
-    c, s = cos(2.0 * pi / WAYS * k), sin(2.0 * pi / WAYS * k)
+    c, s = cos(2.0 * pi / DIRECTIONS * k), sin(2.0 * pi / DIRECTIONS * k)
     return sqrt(aa * c * c + 2.0 * ab * c * s + bb * s * s) - ma * c - mb * s
 
 

@@ -1,6 +1,6 @@
 """Sensors of a walker: a row of measurements after each evaluation, and sources of reflexes.
 
-The plan of a row consists of integers: a head, `SENSES`; per muscle the indices in `data` of
+The plan of a row consists of integers: a head, `SENSOR_PLAN`; per muscle the indices in `data` of
 `OF_MUSCLES`; per coordinate limit force the coordinate and the index of the force in `data`; the
 link of each body; per leg its hip-side body (pelvis) and its foot, and the range of the contacts of the foot.
 The numbers of a row are a head, `SENSOR_NUMBERS`; optimal fiber lengths (m) and strengths (N); smallest and
@@ -34,24 +34,24 @@ OF_LEG = 4
 """Number of integers of a leg."""
 
 
-class SENSES(metaclass=Record):
+class SENSOR_PLAN(metaclass=Record):
     """Head of the plan of a sensor row.
 
     Attributes:
-        MUSCLES, COORDINATES, LEGS, LIMITS, BODIES, CONTROLS, KNOWN: numbers of muscles, coordinates,
+        MUSCLES, COORDINATES, LEGS, LIMITS, BODIES, CONTROLS, NUMBERS: numbers of muscles, coordinates,
             legs, coordinate limit forces, bodies, controls, and of numbers of the row.
         LENGTHS, VELOCITIES: offsets of fiber lengths and velocities over the optimal lengths (1, 1/s).
         FORCES, ACTIVATIONS, ACTIVE: offsets of tendon forces over the strengths, activations, and
             active fiber forces (N).
         VALUES, SPEEDS, MOMENTS: offsets of coordinates, speeds, and limit forces (N, N m).
         LOADS: offset of the ground reaction force of each leg over the weight.
-        PLACES, CENTRE, RISE: offsets of the mass centres of bodies and of all (m), and of the vertical
+        POSITIONS, CENTRE, RISE: offsets of the mass centres of bodies and of all (m), and of the vertical
             velocity of the latter (m/s).
     """
 
-    MUSCLES, COORDINATES, LEGS, LIMITS, BODIES, CONTROLS, KNOWN = range(7)
+    MUSCLES, COORDINATES, LEGS, LIMITS, BODIES, CONTROLS, NUMBERS = range(7)
     LENGTHS, VELOCITIES, FORCES, ACTIVATIONS, ACTIVE, VALUES, SPEEDS, MOMENTS = range(7, 15)
-    LOADS, PLACES, CENTRE, RISE, SIZE, HEAD = range(15, 21)
+    LOADS, POSITIONS, CENTRE, RISE, SIZE, HEAD = range(15, 21)
 
 
 class SENSOR_NUMBERS(metaclass=Record):
@@ -96,12 +96,12 @@ class SOURCE(metaclass=Record):
 
     Attributes:
         KIND: type of the source, such as `SOURCE_TYPE.IN_ROW`.
-        PLACE: index in the row, or number of a link.
+        INDEX: index in the row, or number of a link.
         MORE: second index in the row, or offset of the numbers: point and direction; axes of a frame
             and factors of the angles; or an axis.
     """
 
-    KIND, PLACE, MORE, SIZE = range(4)
+    KIND, INDEX, MORE, SIZE = range(4)
 
 
 def read_source(model: Ints, data: Floats, source: Ints, p: Floats, row: Floats) -> float:
@@ -114,7 +114,7 @@ def read_source(model: Ints, data: Floats, source: Ints, p: Floats, row: Floats)
         p: numbers that contain those of the source.
         row: sensor row.
     """
-    source_type, index = source[SOURCE.KIND], source[SOURCE.PLACE]
+    source_type, index = source[SOURCE.KIND], source[SOURCE.INDEX]
     if source_type == SOURCE_TYPE.IN_ROW:
         return row[index]
     if source_type == SOURCE_TYPE.SPINDLE:
@@ -153,43 +153,47 @@ def fill_sensor_row(model: Ints, data: Floats, y: Floats, i: Ints, p: Floats, ro
         p: numbers of the row.
         row: filled with the measurements.
     """
-    muscles, freedoms, bodies = i[SENSES.MUSCLES], i[SENSES.COORDINATES], i[SENSES.BODIES]
-    muscle_ints, optimal = at(i, SENSES.HEAD), at(p, SENSOR_NUMBERS.HEAD)
+    muscles, freedoms, bodies = (
+        i[SENSOR_PLAN.MUSCLES],
+        i[SENSOR_PLAN.COORDINATES],
+        i[SENSOR_PLAN.BODIES],
+    )
+    muscle_ints, optimal = at(i, SENSOR_PLAN.HEAD), at(p, SENSOR_NUMBERS.HEAD)
     strengths = at(optimal, muscles)
     for k in range(muscles):
         offsets = at(muscle_ints, OF_MUSCLE * k)
-        row[i[SENSES.LENGTHS] + k] = data[offsets[0]] / optimal[k]
-        row[i[SENSES.VELOCITIES] + k] = data[offsets[1]] / optimal[k]
-        row[i[SENSES.FORCES] + k] = data[offsets[2]] / strengths[k]
-        row[i[SENSES.ACTIVATIONS] + k] = data[offsets[3]]
-        row[i[SENSES.ACTIVE] + k] = data[offsets[4]]
-    copy_numbers(2 * freedoms, y, at(row, i[SENSES.VALUES]))
+        row[i[SENSOR_PLAN.LENGTHS] + k] = data[offsets[0]] / optimal[k]
+        row[i[SENSOR_PLAN.VELOCITIES] + k] = data[offsets[1]] / optimal[k]
+        row[i[SENSOR_PLAN.FORCES] + k] = data[offsets[2]] / strengths[k]
+        row[i[SENSOR_PLAN.ACTIVATIONS] + k] = data[offsets[3]]
+        row[i[SENSOR_PLAN.ACTIVE] + k] = data[offsets[4]]
+    copy_numbers(2 * freedoms, y, at(row, i[SENSOR_PLAN.VALUES]))
     # A coordinate without a limit force has none.
     limits = at(muscle_ints, OF_MUSCLE * muscles)
-    moments = at(row, i[SENSES.MOMENTS])
+    moments = at(row, i[SENSOR_PLAN.MOMENTS])
     for k in range(freedoms):
         moments[k] = 0.0
-    for k in range(i[SENSES.LIMITS]):
+    for k in range(i[SENSOR_PLAN.LIMITS]):
         moments[limits[2 * k]] = data[limits[2 * k + 1]]
-    links = at(limits, 2 * i[SENSES.LIMITS])
+    links = at(limits, 2 * i[SENSOR_PLAN.LIMITS])
     total = ZERO
     rise = 0.0
-    centres = at(strengths, muscles + 2 * i[SENSES.CONTROLS])
+    centres = at(strengths, muscles + 2 * i[SENSOR_PLAN.CONTROLS])
     for k in range(bodies):
         position = station(model, data, links[k], vector(centres, 3 * k))
-        store_vector(row, i[SENSES.PLACES] + 3 * k, position)
+        store_vector(row, i[SENSOR_PLAN.POSITIONS] + 3 * k, position)
         total = add_scaled(total, centres[3 * bodies + k], position)
         rise += centres[3 * bodies + k] * velocity(model, data, links[k], position)[1]
     # The mass centre is the mean of those of the bodies, weighted by mass.
-    store_vector(row, i[SENSES.CENTRE], divide(total, p[SENSOR_NUMBERS.MASS]))
-    row[i[SENSES.RISE]] = rise / p[SENSOR_NUMBERS.MASS]
-    for k in range(i[SENSES.LEGS]):
+    store_vector(row, i[SENSOR_PLAN.CENTRE], divide(total, p[SENSOR_NUMBERS.MASS]))
+    row[i[SENSOR_PLAN.RISE]] = rise / p[SENSOR_NUMBERS.MASS]
+    for k in range(i[SENSOR_PLAN.LEGS]):
         leg = at(links, bodies + OF_LEG * k)
-        push = ZERO
+        load = ZERO
         # All contacts of a foot together carry its leg.
         for pair in range(leg[2], leg[3]):
-            push = plus(push, contact_force(model, data, pair))
-        row[i[SENSES.LOADS] + k] = norm(push) / p[SENSOR_NUMBERS.WEIGHT]
+            load = plus(load, contact_force(model, data, pair))
+        row[i[SENSOR_PLAN.LOADS] + k] = norm(load) / p[SENSOR_NUMBERS.WEIGHT]
 
 
 def contact_force(model: Ints, data: Floats, pair: int) -> Vector:
@@ -211,7 +215,7 @@ def foot_position(i: Ints, row: Floats, leg: int) -> float:
         row: sensor row.
         leg: number of the leg.
     """
-    return row[i[SENSES.PLACES] + 3 * leg_ints(i, leg)[1]]
+    return row[i[SENSOR_PLAN.POSITIONS] + 3 * leg_ints(i, leg)[1]]
 
 
 def foot_lead(i: Ints, row: Floats, leg: int) -> float:
@@ -222,7 +226,7 @@ def foot_lead(i: Ints, row: Floats, leg: int) -> float:
         row: sensor row.
         leg: number of the leg.
     """
-    return foot_position(i, row, leg) - row[i[SENSES.PLACES] + 3 * leg_ints(i, leg)[0]]
+    return foot_position(i, row, leg) - row[i[SENSOR_PLAN.POSITIONS] + 3 * leg_ints(i, leg)[0]]
 
 
 def leg_ints(i: Ints, leg: int) -> Ints:
@@ -232,5 +236,10 @@ def leg_ints(i: Ints, leg: int) -> Ints:
         i: plan of the sensor row.
         leg: number of the leg.
     """
-    offset = SENSES.HEAD + OF_MUSCLE * i[SENSES.MUSCLES] + 2 * i[SENSES.LIMITS] + i[SENSES.BODIES]
+    offset = (
+        SENSOR_PLAN.HEAD
+        + OF_MUSCLE * i[SENSOR_PLAN.MUSCLES]
+        + 2 * i[SENSOR_PLAN.LIMITS]
+        + i[SENSOR_PLAN.BODIES]
+    )
     return at(i, offset + OF_LEG * leg)

@@ -23,7 +23,7 @@ from osimlite.mechanics.kernels.reflexes import (
     update_leg_states,
 )
 from osimlite.mechanics.kernels.runs import integrate_run, select_run
-from osimlite.mechanics.kernels.sensors import SENSES, SENSOR_NUMBERS, fill_sensor_row
+from osimlite.mechanics.kernels.sensors import SENSOR_NUMBERS, SENSOR_PLAN, fill_sensor_row
 
 
 class ORDER(metaclass=Record):
@@ -67,8 +67,8 @@ class Walk(NamedTuple):
     """
 
     m: Motion  # run of the walk
-    senses: Ints  # plan of the sensor row, see `sensors`
-    known: Floats  # numbers of the sensor row
+    sensor_plan: Ints  # plan of the sensor row, see `sensors`
+    sensor_numbers: Floats  # numbers of the sensor row
     driven: Ints  # offset of each control in the numbers of the model (c,)
     plan: Ints  # integers of the reflexes, see `reflexes`
     numbers: Floats  # numbers of the reflexes
@@ -92,7 +92,7 @@ def hold_several(
     peaks: Floats,
     control_offsets: Ints,
     controls: Floats,
-    held_by: int,
+    control_count: int,
     running: Ints,
     first: int,
     stop: int,
@@ -111,7 +111,7 @@ def hold_several(
             changed.
         control_offsets: offsets in reals of the controls.
         controls: controls of each copy (copies, held_by).
-        held_by: number of controls.
+        control_count: number of controls.
         running: filled with 1 for a copy that reaches the end of the step, else 0.
         first: number of the first copy.
         stop: number after that of the last copy.
@@ -121,8 +121,8 @@ def hold_several(
     """
     for k in range(first, stop):
         # All copies share the numbers of the model, so controls are written before each copy runs.
-        for number in range(held_by):
-            reals[control_offsets[number]] = controls[held_by * k + number]
+        for number in range(control_count):
+            reals[control_offsets[number]] = controls[control_count * k + number]
         m = select_motion(model, reals, data, sizes, clocks, counts, peaks, control_offsets, k)
         running[k] = (
             1 if integrate_control_step(m, at(states, model[MODEL.STATE_SIZE] * k), False) else 0
@@ -191,7 +191,7 @@ def walk_several(
     counts: Ints,
     states: Floats,
     peaks: Floats,
-    senses: Ints,
+    sensor_plan: Ints,
     sensor_numbers: Floats,
     driven: Ints,
     plan: Ints,
@@ -221,7 +221,7 @@ def walk_several(
         states: state of each walk (walks, y); changed.
         peaks: largest force of each contact (N) and its time (s), for each walk (walks, P, 2);
             changed.
-        senses: plan of the sensor rows, see `sensors.SENSES`.
+        sensor_plan: plan of the sensor rows, see `sensors.SENSOR_PLAN`.
         sensor_numbers: numbers of the sensor rows, see `sensors.SENSOR_NUMBERS`.
         driven: offsets in reals of the excitations.
         plan: integers of the reflexes, see `reflexes.REFLEXES`.
@@ -231,7 +231,7 @@ def walk_several(
         bounds: numbers of the criteria.
         work: memory of the reflexes and workspace of the criteria of each walk (walks,
             `REFLEXES.MEMORY_SIZE`), see LEGS; changed.
-        rows: sensor row of each walk (walks, `SENSES.SIZE`); changed.
+        rows: sensor row of each walk (walks, `SENSOR_PLAN.SIZE`); changed.
         excitations: excitations of each walk (walks, c); changed.
         record: filled with state, excitations, and ratios of leg loads to the body weight, of each
             control step of the walk 0.
@@ -247,10 +247,10 @@ def walk_several(
     size = model[MODEL.STATE_SIZE]
     status = OUTCOME.OK
     for k in range(first, stop):
-        m = select_motion(model, reals, data, sizes, clocks, counts, peaks, senses, k)
+        m = select_motion(model, reals, data, sizes, clocks, counts, peaks, sensor_plan, k)
         walk = Walk(
             m,
-            senses,
+            sensor_plan,
             sensor_numbers,
             driven,
             plan,
@@ -258,8 +258,8 @@ def walk_several(
             criteria,
             bounds,
             at(work, plan[REFLEXES.MEMORY_SIZE] * k),
-            at(rows, senses[SENSES.SIZE] * k),
-            at(excitations, senses[SENSES.CONTROLS] * k),
+            at(rows, sensor_plan[SENSOR_PLAN.SIZE] * k),
+            at(excitations, sensor_plan[SENSOR_PLAN.CONTROLS] * k),
             record,
             at(progress, PROGRESS.SIZE * k),
         )
@@ -284,12 +284,12 @@ def begin_walk(a: Walk, y: Floats, order: int) -> int:
     """
     m = a.m
     # Sensors before the first control step are those without excitations.
-    for k in range(a.senses[SENSES.CONTROLS]):
+    for k in range(a.sensor_plan[SENSOR_PLAN.CONTROLS]):
         m.reals[a.driven[k]] = 0.0
     status = evaluate_state(m, 0.0, y, at(m.data, m.model[MODEL.WORK_STATE]), STAGE.FORCE)
     if status != OUTCOME.OK:
         return status
-    fill_sensor_row(m.model, m.data, y, a.senses, a.known, a.row)
+    fill_sensor_row(m.model, m.data, y, a.sensor_plan, a.sensor_numbers, a.row)
     if order == ORDER.BEGIN:
         for k in range(LEGS):
             a.memory[k] = (
@@ -304,7 +304,7 @@ def begin_walk(a: Walk, y: Floats, order: int) -> int:
         record_sensors(m.model, m.data, a.plan, a.numbers, 0, a.row, at(a.memory, LEGS))
         update_excitations(a)
     elif order == ORDER.START:
-        begin_criteria(a.senses, a.criteria, a.row, criteria_work(a))
+        begin_criteria(a.sensor_plan, a.criteria, a.row, criteria_work(a))
     return status
 
 
@@ -322,27 +322,31 @@ def take_control_steps(a: Walk, y: Floats, steps: int, is_recorded: bool) -> Non
     """
     m = a.m
     progress = a.progress
-    lags = a.known[SENSOR_NUMBERS.LAGS] > 0.0
-    size, controls = m.model[MODEL.STATE_SIZE], a.senses[SENSES.CONTROLS]
+    lags = a.sensor_numbers[SENSOR_NUMBERS.LAGS] > 0.0
+    size, controls = m.model[MODEL.STATE_SIZE], a.sensor_plan[SENSOR_PLAN.CONTROLS]
     # Evaluate the end of the step before with its excitations, which a lagging step begins with.
     if lags:
         apply_excitations(a)
         previous = at(m.data, m.model[MODEL.WORK_STATE])
         copy_numbers(size, y, previous)
         evaluate_state(
-            m, a.known[SENSOR_NUMBERS.STEP], previous, at(previous, size), STAGE.ACCELERATION
+            m,
+            a.sensor_numbers[SENSOR_NUMBERS.STEP],
+            previous,
+            at(previous, size),
+            STAGE.ACCELERATION,
         )
     for number in range(steps):
         if progress[PROGRESS.GOING] == 0:
             return
         update_excitations(a)
         if is_recorded:
-            record = at(a.record, (size + controls + a.senses[SENSES.LEGS]) * number)
+            record = at(a.record, (size + controls + a.sensor_plan[SENSOR_PLAN.LEGS]) * number)
             copy_numbers(size, y, record)
             copy_numbers(controls, a.excitations, at(record, size))
             copy_numbers(
-                a.senses[SENSES.LEGS],
-                at(a.row, a.senses[SENSES.LOADS]),
+                a.sensor_plan[SENSOR_PLAN.LEGS],
+                at(a.row, a.sensor_plan[SENSOR_PLAN.LOADS]),
                 at(record, size + controls),
             )
         apply_excitations(a)
@@ -359,43 +363,52 @@ def take_control_steps(a: Walk, y: Floats, steps: int, is_recorded: bool) -> Non
         ):
             # The method has not evaluated the forces at the end.
             evaluate_state(m, m.clock[0], y, at(m.data, m.model[MODEL.WORK_STATE]), STAGE.FORCE)
-        fill_sensor_row(m.model, m.data, y, a.senses, a.known, a.row)
+        fill_sensor_row(m.model, m.data, y, a.sensor_plan, a.sensor_numbers, a.row)
         record_sensors(
             m.model, m.data, a.plan, a.numbers, progress[PROGRESS.FRAMES], a.row, at(a.memory, LEGS)
         )
         progress[PROGRESS.FRAMES] += 1
         # Time in control steps, which has no accumulated rounding.
-        t = progress[PROGRESS.STEPS] * a.known[SENSOR_NUMBERS.STEP]
+        t = progress[PROGRESS.STEPS] * a.sensor_numbers[SENSOR_NUMBERS.STEP]
         if update_criteria(
-            a.senses, a.known, a.criteria, a.bounds, t, a.row, a.excitations, criteria_work(a)
+            a.sensor_plan,
+            a.sensor_numbers,
+            a.criteria,
+            a.bounds,
+            t,
+            a.row,
+            a.excitations,
+            criteria_work(a),
         ):
             progress[PROGRESS.GOING] = 0
 
 
 def apply_excitations(a: Walk) -> None:
     """Write the excitations to the actuators."""
-    for k in range(a.senses[SENSES.CONTROLS]):
+    for k in range(a.sensor_plan[SENSOR_PLAN.CONTROLS]):
         a.m.reals[a.driven[k]] = a.excitations[k]
 
 
 def criteria_work(a: Walk) -> Floats:
     """Return the workspace of the criteria."""
-    return at(a.memory, LEGS + a.plan[REFLEXES.KEPT] * a.plan[REFLEXES.SENSORS])
+    return at(a.memory, LEGS + a.plan[REFLEXES.HISTORY_LENGTH] * a.plan[REFLEXES.SENSORS])
 
 
 def update_excitations(a: Walk) -> None:
     """Advance the states of the legs, and compute the excitations by reflexes, within their bounds."""
     history = at(a.memory, LEGS)
     frames = a.progress[PROGRESS.FRAMES]
-    count = a.senses[SENSES.CONTROLS]
+    count = a.sensor_plan[SENSOR_PLAN.CONTROLS]
     if a.plan[REFLEXES.HAS_STATES] > 0:
-        update_leg_states(a.senses, a.plan, a.numbers, frames, a.row, history, a.memory)
+        update_leg_states(a.sensor_plan, a.plan, a.numbers, frames, a.row, history, a.memory)
     for k in range(count):
         a.excitations[k] = 0.0
     add_reflexes(a.plan, a.numbers, frames, history, a.memory, a.excitations)
     # Noise is added before bounds apply, as in SCONE.
     add_noise(a.plan, a.numbers, a.progress[PROGRESS.STEPS], count, a.excitations)
-    lower_bounds = at(a.known, SENSOR_NUMBERS.HEAD + 2 * a.senses[SENSES.MUSCLES])
+    lower_bounds = at(
+        a.sensor_numbers, SENSOR_NUMBERS.HEAD + 2 * a.sensor_plan[SENSOR_PLAN.MUSCLES]
+    )
     upper_bounds = at(lower_bounds, count)
     for k in range(count):
         a.excitations[k] = min(max(a.excitations[k], lower_bounds[k]), upper_bounds[k])
@@ -419,7 +432,7 @@ def run_by_reflexes(
     watches: Ints,
     levels: Floats,
     endings: Ints,
-    senses: Ints,
+    sensor_plan: Ints,
     sensor_numbers: Floats,
     driven: Ints,
     plan: Ints,
@@ -453,15 +466,15 @@ def run_by_reflexes(
         watches: integers of the watches, see `record.Motion`.
         levels: numbers of the watches, see `record.Motion`.
         endings: filled with the ending of each run, see `record.ENDING`.
-        senses: plan of the sensor rows, see `sensors.SENSES`.
-        sensor_numbers: numbers of the sensor row of each run (runs, `SENSES.KNOWN`), see
+        sensor_plan: plan of the sensor rows, see `sensors.SENSOR_PLAN`.
+        sensor_numbers: numbers of the sensor row of each run (runs, `SENSOR_PLAN.NUMBERS`), see
             `sensors.SENSOR_NUMBERS`.
         driven: offsets in reals of the excitations.
         plan: integers of the reflexes, see `reflexes.REFLEXES`.
         numbers: numbers of the reflexes of each run (runs, `REFLEXES.NUMBERS`), see
             `reflexes.LIMITS`.
         work: memory of the reflexes of each run (runs, `REFLEXES.MEMORY_SIZE`); changed.
-        rows: sensor row of each run (runs, `SENSES.SIZE`); changed.
+        rows: sensor row of each run (runs, `SENSOR_PLAN.SIZE`); changed.
         excitations: excitations of each run (runs, c); changed.
         record: filled with the control steps of each run (runs, `REFLEXES.ROWS`,
             `control_record_size`), see `begin_control_step`.
@@ -492,33 +505,33 @@ def run_by_reflexes(
         m = select_run(runs, number_count, k)
         walk = Walk(
             m,
-            senses,
-            at(sensor_numbers, senses[SENSES.KNOWN] * k),
+            sensor_plan,
+            at(sensor_numbers, sensor_plan[SENSOR_PLAN.NUMBERS] * k),
             driven,
             plan,
             at(numbers, plan[REFLEXES.NUMBERS] * k),
             plan,
             numbers,
             at(work, plan[REFLEXES.MEMORY_SIZE] * k),
-            at(rows, senses[SENSES.SIZE] * k),
-            at(excitations, senses[SENSES.CONTROLS] * k),
-            at(record, plan[REFLEXES.ROWS] * k * control_record_size(senses, plan)),
+            at(rows, sensor_plan[SENSOR_PLAN.SIZE] * k),
+            at(excitations, sensor_plan[SENSOR_PLAN.CONTROLS] * k),
+            at(record, plan[REFLEXES.ROWS] * k * control_record_size(sensor_plan, plan)),
             at(progress, PROGRESS.SIZE * k),
         )
         endings[k] = integrate_with_reflexes(walk, at(states, k * model[MODEL.STATE_SIZE]))
     return OUTCOME.OK
 
 
-def control_record_size(senses: Ints, plan: Ints) -> int:
+def control_record_size(sensor_plan: Ints, plan: Ints) -> int:
     """Return the length of the record of a control step.
 
     It contains sensors, states of legs, excitations, and the next step to try.
 
     Args:
-        senses: plan of the sensor row.
+        sensor_plan: plan of the sensor row.
         plan: integers of the reflexes.
     """
-    return int(plan[REFLEXES.SENSORS] + LEGS + senses[SENSES.CONTROLS] + 1)
+    return int(plan[REFLEXES.SENSORS] + LEGS + sensor_plan[SENSOR_PLAN.CONTROLS] + 1)
 
 
 def integrate_with_reflexes(a: Walk, y: Floats) -> int:
@@ -538,7 +551,7 @@ def integrate_with_reflexes(a: Walk, y: Floats) -> int:
     end = h[METHOD_WORK.LAST_TIME]
     ending = ENDING.DONE
     while ending == ENDING.DONE:
-        if m.clock[0] >= progress[PROGRESS.STEPS] * a.known[
+        if m.clock[0] >= progress[PROGRESS.STEPS] * a.sensor_numbers[
             SENSOR_NUMBERS.STEP
         ] and not begin_control_step(a, y):
             ending = ENDING.FAILED
@@ -548,7 +561,7 @@ def integrate_with_reflexes(a: Walk, y: Floats) -> int:
             apply_excitations(a)
             # Integrate to the end of the control step or of the run, the earlier of both.
             h[METHOD_WORK.LAST_TIME] = min(
-                progress[PROGRESS.STEPS] * a.known[SENSOR_NUMBERS.STEP], end
+                progress[PROGRESS.STEPS] * a.sensor_numbers[SENSOR_NUMBERS.STEP], end
             )
             ending = integrate_run(m, y, False)
     h[METHOD_WORK.LAST_TIME] = end
@@ -580,7 +593,7 @@ def begin_control_step(a: Walk, y: Floats) -> bool:
         != OUTCOME.OK
     ):
         return False
-    fill_sensor_row(m.model, m.data, y, a.senses, a.known, a.row)
+    fill_sensor_row(m.model, m.data, y, a.sensor_plan, a.sensor_numbers, a.row)
     record_sensors(
         m.model, m.data, a.plan, a.numbers, progress[PROGRESS.FRAMES], a.row, at(a.memory, LEGS)
     )
@@ -588,11 +601,13 @@ def begin_control_step(a: Walk, y: Floats) -> bool:
     update_excitations(a)
     row = progress[PROGRESS.STEPS] - a.plan[REFLEXES.FIRST]
     if row < a.plan[REFLEXES.ROWS]:
-        record = at(a.record, row * control_record_size(a.senses, a.plan))
-        history_offset = sensors * ((progress[PROGRESS.FRAMES] - 1) % a.plan[REFLEXES.KEPT])
+        record = at(a.record, row * control_record_size(a.sensor_plan, a.plan))
+        history_offset = sensors * (
+            (progress[PROGRESS.FRAMES] - 1) % a.plan[REFLEXES.HISTORY_LENGTH]
+        )
         copy_numbers(sensors, at(a.memory, LEGS + history_offset), record)
         copy_numbers(LEGS, a.memory, at(record, sensors))
-        copy_numbers(a.senses[SENSES.CONTROLS], a.excitations, at(record, sensors + LEGS))
-        record[control_record_size(a.senses, a.plan) - 1] = m.clock[1]
+        copy_numbers(a.sensor_plan[SENSOR_PLAN.CONTROLS], a.excitations, at(record, sensors + LEGS))
+        record[control_record_size(a.sensor_plan, a.plan) - 1] = m.clock[1]
     progress[PROGRESS.STEPS] += 1
     return True

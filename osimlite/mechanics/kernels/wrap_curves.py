@@ -71,7 +71,7 @@ def trace_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
     count = 0
     for k in range(int(result[PATH_WORK.COUNT])):
         number = int(order[k])
-        store_vector(f, 3 * count, vector(work, NODE_WORK.SIZE * number + NODE_WORK.PLACE))
+        store_vector(f, 3 * count, vector(work, NODE_WORK.SIZE * number + NODE_WORK.POSITION))
         count += 1
         wrap = (number - points) // 2
         # Of the two nodes of a wrap, points follow the first one.

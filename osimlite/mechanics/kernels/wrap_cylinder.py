@@ -369,8 +369,8 @@ def edge_constants(
     nx, ny, _ = minus(next_point, tangent)
     dx, dy, _ = minus(next_point, end)
     across = dx * dx + dy * dy
-    share = (lx * dx + ly * dy) / across if across > 0.0 else 0.0
-    return sqrt(lx * lx + ly * ly), sqrt(nx * nx + ny * ny), 1.5 * share, 1.5 * (1.0 - share)
+    fraction = (lx * dx + ly * dy) / across if across > 0.0 else 0.0
+    return sqrt(lx * lx + ly * ly), sqrt(nx * nx + ny * ny), 1.5 * fraction, 1.5 * (1.0 - fraction)
 
 
 def next_height(

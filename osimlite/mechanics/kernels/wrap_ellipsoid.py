@@ -16,7 +16,7 @@ from math import acos, cos, isnan, nan, pi, sin, sqrt
 from osimlite.mechanics.kernels.closest_on_ellipsoid import (
     closest_in_plane,
     closest_point,
-    mean_way_out,
+    mean_outward_direction,
 )
 from osimlite.mechanics.kernels.layout import ITEM
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
@@ -239,7 +239,7 @@ def support_point(
         cosine = ALL_FAN + fade * (cosine - ALL_FAN)
     if cosine >= NO_FAN:
         return axial, 0.0, True
-    fanned = closest_point(radii, plus(middle, mean_way_out(radii, start, chord, work)))
+    fanned = closest_point(radii, plus(middle, mean_outward_direction(radii, start, chord, work)))
     if cosine <= ALL_FAN:
         return fanned, 1.0, True
     # Between both limits OpenSim blends the axial and the fanned point.

@@ -96,7 +96,7 @@ class WRAPPING(metaclass=Record):
     """The segment may wrap."""
     MANDATORY = 2
     """The segment must wrap."""
-    NOWHERE = -2
+    NO_POINTS = -2
     """Wrap whose range contains no active point; OpenSim then leaves the path as it is."""
     BEYOND = -3
     """Wrap whose range ends beyond the path; OpenSim then fails."""

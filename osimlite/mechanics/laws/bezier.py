@@ -247,13 +247,13 @@ def search_section(
     Returns:
         u, whether more steps are necessary, y and slope.
     """
-    goes_on = True
+    continues = True
     for _ in range(rounds):
-        u, goes_on = take_halley_step(c, p, stride, u, remainder)
-        if not goes_on:
+        u, continues = take_halley_step(c, p, stride, u, remainder)
+        if not continues:
             break
     y, slope = evaluate_section(c, p, stride, u)
-    return u, goes_on, y, slope
+    return u, continues, y, slope
 
 
 def take_halley_step(

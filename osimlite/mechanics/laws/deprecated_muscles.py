@@ -317,7 +317,7 @@ def next_length(
     error: float,
     error_before: float,
     fibers: float,
-    fully: float,
+    fully_active: float,
     tendon: float,
     m: OldMuscle,
 ) -> float:
@@ -333,7 +333,7 @@ def next_length(
         error: tendon force less fiber force (N).
         error_before: the same for the previous guess (N).
         fibers: normalized fiber force at the present activation.
-        fully: normalized fiber force at full activation.
+        fully_active: normalized fiber force at full activation.
         tendon: normalized tendon force.
         m: parameters of the muscle.
     """
@@ -346,6 +346,7 @@ def next_length(
     # A slack tendon has no stiffness; its modulus over its strength bounds the estimate from below.
     of_tendon = max(tendon, fibers * TENDON_MODULUS / TENDON_STRENGTH) * m.strength / m.slack
     step = min(
-        abs(error / (m.strength / m.optimal * fully / guess.cos + of_tendon)), 0.5 * m.optimal
+        abs(error / (m.strength / m.optimal * fully_active / guess.cos + of_tendon)),
+        0.5 * m.optimal,
     )
     return guess.length + step if error > 0.0 else guess.length - step

@@ -290,9 +290,9 @@ def fiber_compressive_force_cos_pennation(
     return make_curve(((0.0, 1.0, stiffness), (zero, 0.0, 0.0)), [curviness])
 
 
-def _require_condition(holds: bool, otherwise: str) -> None:
+def _require_condition(holds: bool, message: str) -> None:
     if not holds:
-        raise ValueError(otherwise)
+        raise ValueError(message)
 
 
 def _require_below(slope: float, limit: float, name: str) -> None:

@@ -23,7 +23,7 @@ from osimlite.mechanics.kernels.criteria import (
     SAMPLE_WORK,
 )
 from osimlite.mechanics.kernels.pointers import Ints
-from osimlite.mechanics.kernels.sensors import SENSES
+from osimlite.mechanics.kernels.sensors import SENSOR_PLAN
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.studies.reflexes.settings import SettingNode
 from osimlite.studies.reflexes.walkers import SIDES, Walkers
@@ -321,7 +321,7 @@ class JumpMeasure(Measure):
         """
         start, height, peak, prepared, phase = (
             self.read_recorded(self._first, getattr(JUMP_WORK, name))
-            for name in ("START", "HERE", "PEAK", "PREPARED", "DOES")
+            for name in ("START", "HERE", "PEAK", "PREPARED", "PHASE")
         )
         # Rising before the take-off is subtracted: otherwise standing up would count as a jump.
         early = 100.0 * np.maximum(prepared - start, 0.0)
@@ -465,10 +465,10 @@ class DofMeasure(Penalty):
         # Ranges of rotations are in degrees by default, the sensor row is in radians.
         factor = 180.0 / np.pi if node.flag("in_degrees", infos[name].unit == "rad") else 1.0
         for quantity, first_sensor, scale in (
-            ("position", SENSES.VALUES, factor),
-            ("velocity", SENSES.SPEEDS, factor),
-            ("force", SENSES.MOMENTS, 1.0),
-            ("limit_torque", SENSES.MOMENTS, 1.0),
+            ("position", SENSOR_PLAN.VALUES, factor),
+            ("velocity", SENSOR_PLAN.SPEEDS, factor),
+            ("force", SENSOR_PLAN.MOMENTS, 1.0),
+            ("limit_torque", SENSOR_PLAN.MOMENTS, 1.0),
         ):
             range_node = node.get(quantity)
             if range_node is not None:
@@ -495,7 +495,7 @@ class ReactionForceMeasure(Penalty):
             node,
             CRITERION_TYPE.LARGEST_LOAD
             if node.flag("use_force_per_leg", False)
-            else CRITERION_TYPE.WHOLE_LOAD,
+            else CRITERION_TYPE.TOTAL_LOAD,
         )
 
 

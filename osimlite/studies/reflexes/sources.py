@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 
 from osimlite.base.named_tuples import NamedTuple
-from osimlite.mechanics.kernels.sensors import SENSES, SOURCE_TYPE
+from osimlite.mechanics.kernels.sensors import SENSOR_PLAN, SOURCE_TYPE
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.studies.reflexes.settings import SettingNode
 from osimlite.studies.reflexes.walkers import SIDES, SensedModel
@@ -101,7 +101,7 @@ def _select_muscle_factory(quantity: str, offset_index: int) -> SourceFactory:
 
     Args:
         quantity: quantity for the name of the sensor.
-        offset_index: index in `SENSES` of the offset of this quantity in the sensor row.
+        offset_index: index in `SENSOR_PLAN` of the offset of this quantity in the sensor row.
     """
 
     def make_source(sensed_model: SensedModel, node: SettingNode, number: int, side: str) -> Source:
@@ -120,7 +120,7 @@ def _make_spindle_source(
     """Return the sensor of the firing rate of a muscle's spindles, from fiber length and velocity."""
     length, speed = (
         int(sensed_model.sensor_plan[offset_index]) + number
-        for offset_index in (SENSES.LENGTHS, SENSES.VELOCITIES)
+        for offset_index in (SENSOR_PLAN.LENGTHS, SENSOR_PLAN.VELOCITIES)
     )
     return Source(
         f"{sensed_model.paths[number].removeprefix('/')}.spindle",
@@ -135,7 +135,7 @@ def select_coordinate_factory(quantity: str, offset_index: int) -> SourceFactory
 
     Args:
         quantity: quantity for the name of the sensor.
-        offset_index: index in `SENSES` of the offset of this quantity in the sensor row.
+        offset_index: index in `SENSOR_PLAN` of the offset of this quantity in the sensor row.
     """
 
     def make_source(sensed_model: SensedModel, node: SettingNode, number: int, side: str) -> Source:
@@ -148,9 +148,9 @@ def select_coordinate_factory(quantity: str, offset_index: int) -> SourceFactory
     return make_source
 
 
-VALUE_SOURCE = select_coordinate_factory("value", SENSES.VALUES)
+VALUE_SOURCE = select_coordinate_factory("value", SENSOR_PLAN.VALUES)
 """Factory of sensors of the value of a coordinate (rad or m)."""
-SPEED_SOURCE = select_coordinate_factory("speed", SENSES.SPEEDS)
+SPEED_SOURCE = select_coordinate_factory("speed", SENSOR_PLAN.SPEEDS)
 """Factory of sensors of the speed of a coordinate (rad/s or m/s)."""
 
 
@@ -164,7 +164,7 @@ def make_load_source(sensed_model: SensedModel, leg: int) -> Source:
     return Source(
         f"leg{sensed_model.legs[leg].side}.load",
         SOURCE_TYPE.IN_ROW,
-        int(sensed_model.sensor_plan[SENSES.LOADS]) + leg,
+        int(sensed_model.sensor_plan[SENSOR_PLAN.LOADS]) + leg,
     )
 
 
@@ -259,11 +259,13 @@ def _make_angular_velocity_source(
 
 
 _MUSCLE_CHANNELS = (
-    Channel("L", _select_muscle_factory("length", SENSES.LENGTHS), 1.0),
-    Channel("V", _select_muscle_factory("velocity", SENSES.VELOCITIES), allows_negative=False),
-    Channel("F", _select_muscle_factory("force", SENSES.FORCES)),
+    Channel("L", _select_muscle_factory("length", SENSOR_PLAN.LENGTHS), 1.0),
+    Channel("V", _select_muscle_factory("velocity", SENSOR_PLAN.VELOCITIES), allows_negative=False),
+    Channel("F", _select_muscle_factory("force", SENSOR_PLAN.FORCES)),
     Channel("S", _make_spindle_source, allows_negative=False),
-    Channel("A", _select_muscle_factory("activation", SENSES.ACTIVATIONS), allows_negative=False),
+    Channel(
+        "A", _select_muscle_factory("activation", SENSOR_PLAN.ACTIVATIONS), allows_negative=False
+    ),
 )
 """Channels of reflexes on muscles: length, velocity, force, spindle rate and activation.
 

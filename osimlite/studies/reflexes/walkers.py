@@ -14,7 +14,7 @@ from osimlite.errors import ModelError
 from osimlite.mechanics.kernels.layout import OUTCOME
 from osimlite.mechanics.kernels.pointers import Ints
 from osimlite.mechanics.kernels.reflexes import REFLEXES
-from osimlite.mechanics.kernels.sensors import OF_MUSCLES, SENSES
+from osimlite.mechanics.kernels.sensors import OF_MUSCLES, SENSOR_PLAN
 from osimlite.mechanics.kernels.walks import PROGRESS
 from osimlite.mechanics.multibody.mechanism import GROUND, Mechanism
 from osimlite.mechanics.multibody.spatial import Array
@@ -330,7 +330,7 @@ class Walkers(SensedModel):
             **{path: 2 * size + n for n, path in enumerate(state.paths)},
         }
         self._activations = np.array([self.offsets[f"{path}/activation"] for path in self.paths])
-        self.rows = np.zeros((count, self.sensor_plan[SENSES.SIZE]))
+        self.rows = np.zeros((count, self.sensor_plan[SENSOR_PLAN.SIZE]))
         self.excitations = np.zeros((count, len(self.names)))
         self.progress: Ints = np.zeros((count, PROGRESS.SIZE), dtype=np.int64)
         self._driven: Ints = self.copies.control_offsets[self.order]
@@ -394,7 +394,9 @@ class Walkers(SensedModel):
 
     def get_leg_loads(self) -> Array:
         """Return the latest ground reaction forces on the legs over the weight (w, l)."""
-        return self.rows[:, self.sensor_plan[SENSES.LOADS] : self.sensor_plan[SENSES.PLACES]]
+        return self.rows[
+            :, self.sensor_plan[SENSOR_PLAN.LOADS] : self.sensor_plan[SENSOR_PLAN.POSITIONS]
+        ]
 
     def equilibrate_muscles(self, activations: Array) -> None:
         """Set activations (w, m) and bring the fibers of all muscles into equilibrium with them."""

@@ -301,19 +301,26 @@ def compute_delp(
     unit = m.optimal / fields.time
     velocity = now.fiber_velocity / unit
     factor, _, _ = evaluate_function(curves.velocity, velocity)
-    pulled = (
+    force_acceleration = (
         (tendon - (now.activation * active * factor + passive) * cos)
         * cos
         / (fields.mass * unit * unit)
     )
     # The fibers keep their height, so that they turn while they move: the centrifugal part of the
     # acceleration.
-    turned = velocity * velocity * (1.0 - cos * cos) / (cos * cos) / (now.fiber_length / m.optimal)
+    centrifugal_acceleration = (
+        velocity * velocity * (1.0 - cos * cos) / (cos * cos) / (now.fiber_length / m.optimal)
+    )
     activation_rate = compute_schutte_activation_rate(
         now.excitation, now.activation, fields.more, fields.least, fields.time
     )
-    known = list_recorded(now, fibers, m)
-    return *known, activation_rate, now.fiber_velocity, (pulled + turned) * unit / fields.time
+    recorded = list_recorded(now, fibers, m)
+    return (
+        *recorded,
+        activation_rate,
+        now.fiber_velocity,
+        (force_acceleration + centrifugal_acceleration) * unit / fields.time,
+    )
 
 
 def equilibrate_delp(

@@ -209,7 +209,7 @@ class Cable:
         # its length is a number, but the record of the obstacle is not.
         if np.isnan(work).any():
             return None
-        saved_offsets = ints[CABLE.ELEMENTS + ELEMENT.KEPT :: ELEMENT.SIZE].tolist()
+        saved_offsets = ints[CABLE.ELEMENTS + ELEMENT.RECORD :: ELEMENT.SIZE].tolist()
         return Cable(
             tuple(
                 replace(element, begin=work[offset : offset + OBSTACLE_WORK.TOUCH_SIZE].copy())
