@@ -14,6 +14,7 @@ import pytest
 from osimlite.lint import validate
 from tests.conftest import CorpusModel
 
+# Errors in files that OpenSim loads, each with the reason why the error is right.
 PROVED = {
     # Massless fingers are at the ends of chains: the mass matrix is singular, and accelerations are NaN.
     "m0109": {"OSIM407"},

@@ -37,11 +37,13 @@ SEARCH_SECONDS = 60.0
 It is longer because a study limits its own number of iterations.
 """
 
+# How a command ends that another program has stopped by SIGTERM.
 TERMINATED = "crash -15"
 
 WALL_SECONDS = 240.0
 """Wall-clock time (s) after which a command is stopped; it allows for a busy machine."""
 
+# Program of the server: it runs each command that it reads, and prints how the command ended.
 SERVER = """
 import contextlib, io, json, os, resource, sys, time, traceback
 from osimlite.cli import main
@@ -71,7 +73,7 @@ class Kind(NamedTuple):
 
     ending: str
     sources: tuple[str, ...]  # paths below the fixtures
-    beside: tuple[str, ...]
+    beside: tuple[str, ...]  # paths below the fixtures, or @NAME for a file of `_made`
     commands: tuple[tuple[str, ...], ...]  # @ stands for the damaged file
 
 
@@ -80,6 +82,7 @@ _SLIDE = ("setups/slide.osim", "setups/slide_guess.sto", "setups/slide_states.st
 _IMU = ("pipelines/pendulum/orientations.sto", "pipelines/pendulum/angles.sto")
 _OUT = ("-o", "out")
 
+# Kinds of files by their endings.
 KINDS = {
     ".c3d": Kind(
         ".c3d",
@@ -170,6 +173,7 @@ MESH_MODEL = """<OpenSimDocument Version="40600"><Model name="m"><Ground name="g
 <Mesh name="g"><mesh_file>it.vtp</mesh_file></Mesh></attached_geometry></Ground></Model></OpenSimDocument>
 """
 
+# Pieces that are inserted into files.
 TOKENS = (
     b"<", b">", b"\0", b"\xff", b"nan", b"inf", b"-1", b"1e400", b"9" * 30, b"&", b"\"", b"\t", b"\n", b"{", b"}",
     b"[", b"]", b"..", b"/", b"<!--", b"<![CDATA[", b": &a *a", b"\xef\xbb\xbf", b"0", b" ",
@@ -182,6 +186,7 @@ VALUES = (
 )  # fmt: skip
 """Values that replace numbers and names."""
 
+# Numbers and names in XML, tables and scenarios.
 _WORD = re.compile(
     rb"(?<=>)[^<>\s][^<>]*(?=<)|(?<=[\s=:{\[,~\"])[-+]?[0-9][0-9.e+-]*|(?<== )[\w./*]+"
 )

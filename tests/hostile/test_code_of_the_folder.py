@@ -15,6 +15,7 @@ import osimlite
 from osimlite.base.require import SAFE_PATH, leave_current_folder, protect_processes, require
 
 ROOT = Path(osimlite.__file__).parents[1]
+# Names of modules that osimlite or its libraries import.
 MODULES = (
     "ctypes",
     "numpy",

@@ -121,6 +121,7 @@ def test_damaged_parameters(tmp_path: Path, content: bytes) -> None:
         read_par(tmp_path / "it.par")
 
 
+# Invalid settings of an optimizer in a scenario.
 SETTINGS = [
     ("lambda", "inf"),
     ("lambda", "nan"),
@@ -223,6 +224,7 @@ def test_polygons_of_many_corners(count: int) -> None:
 
 # --------------------------------------------------------------------------------------------------- texts
 
+# Beginnings of constructs that a text never closes.
 OPEN = [
     "<!--",
     "<a ",
@@ -299,6 +301,7 @@ def test_whole_numbers_of_any_length(tmp_path: Path, number: str) -> None:
             osimlite.io.document.data.read_data(tmp_path / name)
 
 
+# Invalid settings files: name, content, and whether the file is ignored instead of rejected.
 BROKEN_SETTINGS = [
     ("pyproject.toml", "tool = 5", True),
     ("pyproject.toml", "[[tool]]\nx = 1", True),
@@ -329,6 +332,7 @@ def test_settings_that_make_no_sense(
 
 
 CLASS = '{"classes":{"My":{"bases":["Force"],"properties":[{"name":"x","type":"double",%s}]}}}'
+# Invalid declarations of plug-in classes.
 CLASSES = [
     CLASS % '"min":"abc"',
     CLASS % '"min":[1]',

@@ -16,6 +16,7 @@ from osimlite.tools.named_files import find_named_files
 from osimlite.tools.patterns import find_files
 from tests.suite import choose
 
+# Patterns for which backtracking takes exponential time.
 SLOW = [
     "(.*)*(.*)*(.*)*(.*)*(.*)*!",
     "(a+)+$b",
@@ -26,6 +27,7 @@ SLOW = [
     "(x+x+)+y",
 ]
 ASSERTIONS = ["^", "$", r"\b", "(?=a)", "(?!b)", "(?=a*b)", "(?!(?=b).*/)", "(?=.*(?!a)b)"]
+# Pieces of random regular expressions.
 ATOMS = [
     "a",
     "b",

@@ -10,6 +10,7 @@ import pytest
 from osimlite.errors import DocumentError, OsimliteError
 from osimlite.io.bvh import ROTATIONS, BvhJoint, BvhMotion, find_angles, format_bvh, read_bvh
 
+# File in the style of other programs: names with blanks, and several orders of rotations.
 TEXT = """HIERARCHY
 ROOT Hips of a man
 {

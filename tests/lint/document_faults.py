@@ -174,6 +174,7 @@ def name_in_the_model(project: Project, draw: random.Random) -> Change | None:
     )
 
 
+# Texts that are not numbers, or not the numbers that they seem to be.
 _TEXT_FOR_NUMBER = ("abc", "1,5", "--1", "1e", "one", "0x10", "1.2.3", "true")
 
 

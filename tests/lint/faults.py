@@ -104,6 +104,7 @@ def tag(old: str, new: str, marker: str) -> Change:
     return change
 
 
+# Beginnings of elements of the walker after which changes are made.
 SHANK = '<Body name="RightShank">'
 FOOT_FORCE = '<HuntCrossleyForce name="RFootForce">'
 FOOT = '<ContactSphere name="RFootContact">'
@@ -516,6 +517,7 @@ FILES = [
     ),
 ]
 
+# All faults; OpenSim's reaction to each was measured.
 FAULTS = [*REFERENCES, *STRUCTURE, *VALUES, *PHYSICS, *NAMES, *TOPOLOGY, *FILES]
 
 VALID = {

@@ -16,10 +16,12 @@ Change = Callable[[str], str]
 It raises `ValueError` if the model has nothing to change.
 """
 
+# Tags of physical parameters, as a regular expression.
 PARAMETERS = (
     "stiffness|radius|max_isometric_force|optimal_fiber_length|tendon_slack_length|optimal_force|"
     "resting_length|rest_length|translational_stiffness|upper_stiffness"
 )
+# Tags of boolean properties, as a regular expression.
 FLAGS = "locked|clamped|prescribed|isDisabled|appliesForce|isEnforced|compute_energy"
 
 
@@ -138,6 +140,7 @@ def _double_last_joint(text: str) -> str:
     return text[: joint.end()] + copy + text[joint.end() :]
 
 
+# Tags of classes, as regular expressions.
 BODY, JOINT, COORDINATE = "Body", r"\w+Joint", "Coordinate"
 FORCE = r"\w+(?:Force|Muscle|Actuator|Ligament)\w*"
 

@@ -12,6 +12,7 @@ POINTS = "".join(
         ]
     )
 )
+# Document of version 30000, whose joints are inside of bodies.
 OLD = f"""<?xml version="1.0" encoding="UTF-8"?>
 <OpenSimDocument Version="30000"><Model name="old"><BodySet><objects>
 <Body name="ground"><mass>0</mass><Joint/></Body>
@@ -41,6 +42,7 @@ OLD = f"""<?xml version="1.0" encoding="UTF-8"?>
 </Thelen2003Muscle>
 </objects></ForceSet></Model></OpenSimDocument>
 """
+# Document of version 30502, between the formats of OpenSim 3 and 4.
 YEARS_BETWEEN = """<?xml version="1.0" encoding="UTF-8"?>
 <OpenSimDocument Version="30502"><Model name="m"><Ground name="ground"/><BodySet><objects>
 <Body name="ball"><mass>1</mass><mass_center>0 0 0</mass_center><inertia>1 1 1 0 0 0</inertia></Body>
@@ -78,6 +80,7 @@ VECTORS = (
     ),
     *("1 <!-- a --> 1 1", "<x/>", "1 1 1<x/>"),
 )
+# Texts for an integer property, several of them invalid.
 ACCELERATION_STAGE = (
     "4",
     "0",
@@ -93,6 +96,7 @@ ACCELERATION_STAGE = (
     "99999999999",
     "0x3",
 )
+# Texts for a number, most of them invalid.
 NUMBERS = (
     "abc",
     "",
@@ -122,6 +126,7 @@ DEFAULTS = (
     "<ControlLinear><x_nodes><Body/></x_nodes></ControlLinear>",
 )
 
+# Texts for a list of numbers with various separators.
 LISTS = (
     "0 1 2",
     "0,1,2",
@@ -136,6 +141,7 @@ LISTS = (
     "[0 1 2",
 )
 
+# Base document, text to be replaced and its replacement, by the name of the case.
 CASES: dict[str, tuple[str, str, str]] = {
     **{
         text: (OLD, '<Model name="old">', f'<Model name="old"><defaults>{text}</defaults>')

@@ -17,32 +17,34 @@ from tests.oracle.structural_edits import Text
 
 FIXTURES = Path(__file__).resolve().parents[2] / "fixtures"
 
+# File and line number.
 Place = tuple[str, int]
 
 NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?(inf|infinity|nan)", re.IGNORECASE)
+# Start tag with a name.
 _NAMED = re.compile(r'<(\w+) name="([^"]+)"')
 
 
 class Fault(NamedTuple):
     """Fault in a project, with the changed files (None for a missing file) and where it may be reported."""
 
-    kind: str
-    what: str
-    file: str
-    texts: dict[str, str | None]
-    places: frozenset[Place]
-    sure: bool
+    kind: str  # name of the function that made the fault
+    what: str  # description
+    file: str  # changed file
+    texts: dict[str, str | None]  # new text of each changed file, None for a missing file
+    places: frozenset[Place]  # lines where the fault may be reported
+    sure: bool  # whether the change is a fault in every project
 
 
 class Change(NamedTuple):
     """Changed text of one file, with the lines and words that the change concerns."""
 
-    file: str
-    what: str
-    text: str | None
-    lines: tuple[int, ...]
-    words: tuple[str, ...] = ()
-    sure: bool = False
+    file: str  # changed file
+    what: str  # description
+    text: str | None  # new text, None for a missing file
+    lines: tuple[int, ...]  # changed lines, and others where the fault may be reported
+    words: tuple[str, ...] = ()  # names that the change is about
+    sure: bool = False  # whether the change is a fault in every project
 
 
 class Table:
@@ -118,6 +120,7 @@ class Project:
         }
 
 
+# Ways to misspell a word.
 _MISSPELT: tuple[Callable[[random.Random, str], str], ...] = (
     lambda draw, word: word[: (at := draw.randrange(len(word)))] + word[at + 1 :],
     lambda draw, word: word[: (at := draw.randrange(len(word)))] + word[at] + word[at:],

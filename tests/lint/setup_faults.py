@@ -24,13 +24,13 @@ class Fault(NamedTuple):
     text `line_of` (default: the changed line). The changes `also` to other files are made first.
     """
 
-    number: int | str
+    number: int | str  # number in the table of faults, or a name for a fault outside of it
     file: str
-    old: str
+    old: str  # text to be replaced once; "every:" before it replaces all occurrences
     new: str
     found_in: str = ""
     line_of: str = ""
-    also: tuple[tuple[str, str, str], ...] = ()
+    also: tuple[tuple[str, str, str], ...] = ()  # file, old text and new text of further changes
 
 
 def line(name: str, beginning: str) -> str:
@@ -84,6 +84,7 @@ def swapped(one: str, other: str) -> str:
     return "\t".join({one: other, other: one}.get(label, label) for label in labels)
 
 
+# Rows and pieces of the files of the pipeline, to which the faults below refer.
 TRC = rows("walk.trc")
 COORDS = rows("coords.mot")
 HEAD = TEXTS["walk.trc"].splitlines()
@@ -129,7 +130,9 @@ def constraint(tag: str, text: str) -> str:
 
 PATHS = re.sub(r"(?<=\t)(\w+)", r"/jointset/j/\1/value", LABELS)
 BARE = re.sub(r"</?OpenSimDocument.*\n", "", TEXTS["ik.xml"])
+# Marker file whose first marker is NaN in all frames.
 NEVER_SEEN = re.sub(r"(?m)^(\d+\t[\d.]+)(\t[^\t]*){3}", r"\1\tNaN\tNaN\tNaN", TEXTS["walk.trc"])
+# Setup of inverse kinematics with only three markers.
 TOO_FEW = re.sub(
     r"(<IK\w+Task name=\"(?!Sternum|R.ASIS|L.ASIS)[^>]*>\s*<apply>)true",
     r"\1false",

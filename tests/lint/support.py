@@ -67,6 +67,7 @@ MOTION = b"knee\nversion=1\nnRows=3\nnColumns=3\ninDegrees=yes\nendheader\ntime\
 MARKERS = (LINT / "leg.trc").read_bytes().replace(b"Z3\t\n", b"Z3\n")
 
 
+# Faults in a motion or marker file: name, valid content, pattern and its replacement.
 BROKEN = [
     ("count", MOTION, rb"nRows=3", b"nRows=2"),
     ("count-of-columns", MOTION, rb"nColumns=3", b"nColumns=4"),

@@ -1,7 +1,7 @@
 """Check that damaged files give findings at valid positions within the time limit, and that no content is lost.
 
-The default are three hundred damaged files; ``OSIMLITE_DAMAGE=20000 OSIMLITE_SEED=7`` sets their
-number and the seed, and ``OSIMLITE_DAMAGE_FOLDER=...`` adds all files of a folder.
+The quick suite damages 50 files, the full one 3000. ``OSIMLITE_DAMAGE=20000 OSIMLITE_SEED=7`` sets
+their number and the seed, and ``OSIMLITE_DAMAGE_FOLDER=...`` adds all files of a folder.
 """
 
 from __future__ import annotations
@@ -34,7 +34,9 @@ FIXTURES = Path(__file__).resolve().parents[2] / "fixtures"
 WANTED = int(os.environ.get("OSIMLITE_DAMAGE", choose("50", "3000")))
 FIRST = int(os.environ.get("OSIMLITE_SEED", "0"))
 MORE = os.environ.get("OSIMLITE_DAMAGE_FOLDER")
+# Number of tests among which the damaged files are divided.
 GROUPS = 20
+# Limit of processor time (s) for one check.
 SECONDS = 20
 
 SCRAPS = [
@@ -130,10 +132,12 @@ def _noise(data: bytes, draw: random.Random) -> bytes:
     return draw.choice([b"", data[:start]]) + draw.randbytes(draw.choice([0, 1, 100, 5000]))
 
 
+# All kinds of damage.
 WAYS: list[Callable[[bytes, random.Random], bytes]] = [
     _cut, _insert, _double, _lines_changed, _numbers_changed, _other_letters, _ends, _one_line, _nested, _noise,
     lambda data, draw: data[: draw.randrange(len(data) + 1)],
 ]  # fmt: skip
+# Relative frequency of each kind of damage.
 WEIGHTS = [4, 6, 3, 4, 4, 2, 2, 1, 1, 1, 3]
 
 

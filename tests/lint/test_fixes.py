@@ -21,6 +21,7 @@ faults = importlib.util.module_from_spec(_spec)
 _spec.loader.exec_module(faults)
 BY_NAME = {fault.name: fault for fault in faults.FAULTS}
 
+# Faults with a safe fix.
 SAFE = [
     "hc_geom_comma",
     "hc_geom_wrong_case",
@@ -31,6 +32,7 @@ SAFE = [
     "dup_property",
     "unknown_attribute",
 ]
+# Faults with an unsafe fix only.
 UNSAFE = [
     "hc_geom_misspelled",
     "joint_parent_misspelled",

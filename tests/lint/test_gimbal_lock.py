@@ -9,6 +9,7 @@ import osimlite
 from osimlite.lint import validate
 from tests.simple_models import make_single_body
 
+# Number of random joints.
 SIZE = 12
 
 

@@ -18,6 +18,7 @@ SETUP = """<?xml version="1.0"?>
   </InverseKinematicsTool>
 </OpenSimDocument>
 """
+# XML files of other programs.
 OTHERS = {
     "urdf": """<robot name="r"><link name="a"><inertial><mass value="1"/></inertial></link>
         <joint name="j" type="fixed"><parent link="a"/><child link="b"/><origin xyz="0 0 0"/></joint></robot>""",

@@ -1,7 +1,7 @@
 """Check that a random fault in a complete project is found on its line in the right file.
 
-The default are three hundred faults; ``OSIMLITE_FAULTS=2000 OSIMLITE_SEED=7`` sets their number and
-the seed. ``tests/oracle/test_random_faults.py`` compares such faults with OpenSim.
+The quick suite has 30 faults, the full one 300. ``OSIMLITE_FAULTS=2000 OSIMLITE_SEED=7`` sets their
+number and the seed. ``tests/oracle/test_random_faults.py`` compares such faults with OpenSim.
 """
 
 from __future__ import annotations

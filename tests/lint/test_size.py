@@ -44,6 +44,7 @@ def circle(count: int) -> str:
 
 LOST = "<Station name='s{0}'><socket_parent_frame>/bodyset/b{0}</socket_parent_frame></Station>"
 LIMIT = "<CoordinateLimitForce name='s{0}'><coordinate>x{0}</coordinate></CoordinateLimitForce>"
+# Functions that return a model with n faults of one kind.
 KINDS = {
     "bodies of one name": lambda n: model(BODY.format("b", "", "") * n),
     "attributes": lambda n: model(BODY.format("b", " ".join(f"a{k}='1'" for k in range(n)), "")),

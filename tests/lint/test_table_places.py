@@ -20,6 +20,7 @@ MARKERS = (
     for row in range(6)
 )
 
+# Changes of the storage file: old text, new text, and the expected findings with line and column.
 OF_STORAGE = {
     "NaN": ("13.00", "NaN", ["OSIM807 10:5"]),
     "word": ("-22.00", "abc", ["OSIM807 10:11"]),
@@ -54,6 +55,7 @@ OF_STORAGE = {
     "mark": ("walk", "\ufeffwalk", []),
 }
 
+# Changes of the marker file: old text, new text, and the expected findings with line and column.
 OF_MARKERS = {
     "blank line": ("3\t0.02", "\n3\t0.02", ["OSIM806 9:1"]),
     "empty cell": ("102\t1000", "102\t", ["OSIM812 9:8"]),

@@ -41,6 +41,7 @@ def test_rows_of_numbers_in_any_form_have_no_fault(draw, columns, count, separat
     )
 
 
+# Texts that are not finite decimal numbers.
 WRONG = [
     "nan",
     "NaN",

@@ -1,6 +1,6 @@
 """Read measurements of a trial from the examples and fixtures of rules about trials.
 
-A line for each number: ``peak of FY: 61 N, with loads of 850 N``.
+Each line states one number: ``peak of FY: 61 N, with loads of 850 N``.
 """
 
 from __future__ import annotations

@@ -78,6 +78,7 @@ def _tag(name: str, **properties: object) -> str:
     return f'<{name} name="f">{inside}</{name}>'
 
 
+# Paths of frames.
 GROUND, A, B = "/ground", "/bodyset/a", "/bodyset/b"
 LOCKED = "<locked>true</locked>"
 

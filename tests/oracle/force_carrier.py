@@ -19,8 +19,11 @@ from tests.oracle.opensim_runs import put
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 
+# Time (s) at which forces are compared.
 TIME = 0.37
+# Number of random states that are compared.
 STATES = 4
+# Classes of the three joints of the carrier.
 JOINTS = {
     "free, ball, pin": ("FreeJoint", "BallJoint", "PinJoint"),
     "pin, slider, universal": ("PinJoint", "SliderJoint", "UniversalJoint"),
@@ -126,6 +129,7 @@ def compare(model, tmp_path, *, counted=1, tolerance=1e-9):
     return busy
 
 
+# Frames that two-frame forces connect.
 PAIRS = (
     ("/ground", "/bodyset/b2/f2"),
     ("/bodyset/b1/f1", "/bodyset/b0"),
@@ -141,6 +145,7 @@ def between(kind, **more):
     ]
 
 
+# Points of the paths of path forces: frame and location (m).
 ROUTES = (
     (("/ground", (1.0, 0.5, 0.2)), ("/bodyset/b2", (0.1, 0.2, 0.3))),
     (

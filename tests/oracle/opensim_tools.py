@@ -16,7 +16,9 @@ from pathlib import Path
 
 import opensim
 
+# Limit of processor time (s) for one tool.
 SECONDS = 12
+# File in the folder of the tool with everything that the tool prints.
 LOG = ".log"
 
 

@@ -14,6 +14,7 @@ import sys
 
 import opensim
 
+# Time (s) after which a model counts as hanging.
 SECONDS = 60
 
 

@@ -12,6 +12,7 @@ from osimlite.schema.function_types import PolynomialFunction, Sine
 from osimlite.schema.functions import Constant, LinearFunction
 from osimlite.schema.springs import BushingForce, PointToPointSpring, SpringGeneralizedForce
 
+# Number of coordinates of each class of joints.
 COORDINATES = {
     "PinJoint": 1,
     "SliderJoint": 1,

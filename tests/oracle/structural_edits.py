@@ -15,6 +15,7 @@ from typing import NamedTuple
 from osimlite.io.document.source import Source
 from osimlite.schema.registry import list_tags
 
+# Format versions that documents may state; the last one is newer than OpenSim 4.6.
 VERSIONS: tuple[int, ...] = (
     10500,
     10600,
@@ -33,6 +34,7 @@ VERSIONS: tuple[int, ...] = (
     30507,
 )
 VERSIONS += (30508, 30510, 30512, 30514, 30516, 30517, 40000, 40500, 40600, 40601)
+# Texts that replace a value.
 VALUES: tuple[str, ...] = (
     "",
     "NaN",
@@ -121,7 +123,7 @@ class Element(NamedTuple):
     """Element of a text: tag, index of its parent, and offsets in the text."""
 
     tag: str
-    parent: int
+    parent: int  # index in `Text.elements`, -1 at the top
     start: int
     head: int  # end of the start tag
     tail: int  # beginning of the end tag
@@ -443,6 +445,7 @@ def _rename(text: Text, draw: random.Random) -> tuple[str, str] | None:
     return f"{text.path(element)}: name {old!r} -> {new!r}", text.put((at, at + len(old), new))
 
 
+# All operations; those listed several times are chosen more often.
 OPERATIONS: tuple[Operation, ...] = (
     _attribute,
     _delete,

@@ -40,6 +40,7 @@ from tests.scripts import run_script
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 
 
+# OpenSim bodies of a test model.
 Bodies = list[Any]
 
 
@@ -188,6 +189,7 @@ def _prescribed_with_rod(model: Any, bodies: Bodies) -> None:
     _rod(model, bodies)
 
 
+# Constraints and prescribed coordinates by name, as functions that add them to the model of `_chain`.
 CASES: dict[str, Change] = {
     "point": _point,
     "rod": _rod,
@@ -259,7 +261,7 @@ def model_with(kind: str) -> osimlite.Model:
 class Place(NamedTuple):
     """Reference to a component in a text: kind of the reference, offset, and the word itself."""
 
-    kind: str
+    kind: str  # class and property
     start: int
     word: str
 
@@ -267,11 +269,11 @@ class Place(NamedTuple):
 class Target(NamedTuple):
     """Component that a reference leads to: class, name, range of its element, offset of its name attribute."""
 
-    cls: str
+    cls: str  # class of the component
     name: str
-    start: int
+    start: int  # offsets of its element
     end: int
-    name_start: int
+    name_start: int  # offset of its name attribute
 
 
 class Victim(NamedTuple):
@@ -284,9 +286,9 @@ class Victim(NamedTuple):
     name: str
     folder: Path
     text: str
-    places: dict[str, list[Place]]
-    names: list[str]
-    targets: dict[str, list[Target]]
+    places: dict[str, list[Place]]  # references by kind
+    names: list[str]  # all names that references use
+    targets: dict[str, list[Target]]  # components that references lead to, by class
 
 
 def places_of(source: Source) -> Iterator[Place]:
@@ -366,6 +368,7 @@ def claims_refusal(finding: Finding) -> bool:
     return finding.consequence is Consequence.REFUSES
 
 
+# Properties that the new muscles take from the old ones.
 KEPT = (
     "name",
     "max_isometric_force",
@@ -391,6 +394,7 @@ def with_muscles_of(model: Model, cls: type[Muscle], more: dict[str, Any]) -> Mo
     return model
 
 
+# Operations of probes.
 OPERATIONS = "value", "integrate", "differentiate", "minimum", "minabs", "maximum", "maxabs"
 
 

@@ -23,6 +23,7 @@ from tests.simulation.elements.muscle_rows import MASS, hung, line
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle
 
+# Number of random states that are compared.
 STATES = 6
 BOUNDS = {
     "activation": (0.05, 1.1),
@@ -32,6 +33,7 @@ BOUNDS = {
     "fiber_velocity": (-0.5, 0.5),
 }
 """Range of each state from which the tests draw values, by the name of the state."""
+# Ranges of random parameters, common to all Hill-type muscles.
 HILL = {
     "max_isometric_force": (200, 2000),
     "optimal_fiber_length": (0.05, 0.06),
@@ -74,6 +76,7 @@ THELEN = {
     "Flen": (1.2, 1.9),
 }
 RIGID = {"ignore_tendon_compliance": True}
+# Class, ranges of random parameters, and further properties, by the name of the case.
 CASES = {
     "coordinate": (
         "ActivationCoordinateActuator",

@@ -46,8 +46,10 @@ def over(kind, frame, *location, hint=(nan, nan, nan)):
     return kind, frame, location, hint
 
 
+# Ends of paths.
 HIGH, LOW, END = at(GROUND, -0.1, 0.1, 0), at(GROUND, -0.1, 0.03, 0.01), at(B2, 0, 0.02, 0)
 UP = {"hint": (0, 0.1, 0)}
+# Elements of each path: points and obstacles.
 PATHS = {
     "straight": (
         at(GROUND, 0.1, 0.1, 0),

@@ -12,6 +12,7 @@ from tests.suite import choose
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle
 
+# Final time (s), accuracy, and number of random starts.
 UNTIL, ACCURACY, STARTS = 1.0, 1e-9, choose(2, 20)
 
 

@@ -88,6 +88,7 @@ def test_motion_under_constraints(case: str, engine: str, tmp_path: Path) -> Non
     assert our_steps == their_steps
 
 
+# Models of the corpus, and the duration (s) of their simulation.
 CORPUS = {
     "m0005": 0.6,  # gait10dof18musc
     "m0013": 0.6,  # gait2392

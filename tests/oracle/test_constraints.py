@@ -227,9 +227,9 @@ def test_rolling_acts_when_asked_for(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("accuracy", "off"), [(1e-9, 5e-11), (1e-9, 1e-3), (1e-3, 5e-5)])
 def test_a_motion_starts_at_opensims_pose(accuracy: float, off: float, tmp_path: Path) -> None:
-    """OpenSim does not assemble a pose that is within a tenth of the assembly accuracy.
+    """OpenSim leaves a pose within a tenth of the assembly accuracy unchanged.
 
-    Only the integrator then corrects the pose, by an equal change of all coordinates.
+    Only its integrator then projects the pose onto the constraints, by the shortest way.
     """
     model, bodies = _chain(np.random.default_rng(14))
     _coupler(("ball_0",), "pin_0", _linear((1.0, 0.0)))(model, bodies)

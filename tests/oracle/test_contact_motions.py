@@ -35,6 +35,7 @@ from tests.simulation.meshes import ball, block, write_obj, write_vtp
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle
 
+# Rotation that turns the normal of a half space upwards (rad).
 UP = (0.0, 0.0, -1.5707963267948966)
 
 

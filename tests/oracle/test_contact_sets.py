@@ -21,8 +21,10 @@ from tests.mechanics.laws.contact_sets import contact_forces, simbody_pair_order
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle
 
+# Values of the properties below, in SI units.
 MATERIAL = 1e6, 1.5, 0.8, 0.4, 0.3
 PROPERTIES = "Stiffness", "Dissipation", "StaticFriction", "DynamicFriction", "ViscousFriction"
+# Transition velocity of friction (m/s).
 TRANSITION = 0.1
 NORMAL = 0.0, 1.0, 0.0
 

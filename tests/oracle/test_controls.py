@@ -52,6 +52,7 @@ def compare_controls(path, times, tolerance=1e-12) -> None:
         )
 
 
+# Times (s) before, within and after the data, and at their jumps.
 TIMES = [-1.0, -0.1, 0.0, 0.013, 0.2, 0.3, 0.37, 0.5, 0.61, 0.99, 1.0, 1.7]
 
 

@@ -27,6 +27,7 @@ pytestmark = pytest.mark.oracle
 
 SMALL = 15_000
 """Compressed size (bytes) of OpenSim's print up to which a model is included by default: a leg or an arm."""
+# Duration (s) and accuracy of the motions.
 SECONDS, ACCURACY = 0.05, 1e-5
 MOST_STEPS = 2_000
 """Largest number of steps for OpenSim; models that it can simulate need a tenth of it."""
@@ -41,6 +42,7 @@ STUCK = {"m0115", "m0123"} | SLOWLY | SINGULAR
 """Models for which OpenSim's simulation ends in NaN, or does not end."""
 SENSITIVE = {"m0014", "m0037", "m0116", "m0161", "m0163", "m0172", "m0225"}
 """Models for which OpenSim's own result changes as much if the start changes by 1e-14 or 1e-11."""
+# Options with which osimlite repeats OpenSim's approximations.
 CHOICES: Any = {"opensim_derivatives": True, "simbody_early_return": True}
 
 

@@ -23,6 +23,7 @@ OLD |= {"force_files": "CMCTool", "replaced_forces": "AnalyzeTool"}
 """Documents of old versions, and the class with which OpenSim reads each."""
 
 
+# Script that prints documents with OpenSim.
 PRINT = """
 import os, sys, opensim
 opensim.Logger.setLevelString("off")

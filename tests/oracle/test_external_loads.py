@@ -22,6 +22,7 @@ pytestmark = pytest.mark.oracle
 from tests.oracle.force_carrier import JOINTS, carrier  # noqa: E402
 from tests.oracle.opensim_runs import inverse_dynamics, put  # noqa: E402
 
+# Columns of the loads: two forces with point and torque.
 LABELS = [
     f"{side}{what}{axis}" for side in ("", "1_") for what in ("f_v", "f_p", "m_") for axis in "xyz"
 ]

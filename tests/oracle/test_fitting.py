@@ -35,6 +35,7 @@ from tests.tools.support import unpacked
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle
 
+# Script that scales a model with OpenSim.
 SCALE = """
 import json, sys, opensim
 opensim.Logger.setLevelString("Off")
@@ -50,6 +51,7 @@ model.scale(state, factors, sys.argv[3] == "True", float(sys.argv[2]))
 model.printToXML("theirs.osim")
 """
 QUIET = "opensim.Logger.setLevelString('Off')"
+# Script that runs OpenSim's inverse kinematics.
 FIT = """
 import sys, opensim
 opensim.Logger.setLevelString("Off")

@@ -48,6 +48,7 @@ OF_TWO = (
     "atan(x)+asin(y/3)+acos(x/4)*cos(y)+sec(x)-csc(2+y)+tan(x)*cot(2+y)+sinh(x)+cosh(y)+erf(x)-erfc(y)+recip(3+x)",
     "(2+x)^(y+1)+2^x+(3+y)^2+step(x)*y+delta(y)-k*x;k=x/(3-y)",
 )
+# Coordinates, length function, moment arm functions and speed function of each path.
 PATHS = {
     "a spline": ((ONE,), SPLINE, (), None),
     "a polynomial of one": (

@@ -32,6 +32,7 @@ PLACER = """<OpenSimDocument Version="40600">
     </IMUPlacer>
 </OpenSimDocument>
 """
+# Script that runs OpenSim's IMUPlacer.
 PLACE = """
 import opensim
 opensim.Logger.setLevelString("Off")
@@ -56,11 +57,13 @@ TOOL = """<OpenSimDocument Version="40600">
     </IMUInverseKinematicsTool>
 </OpenSimDocument>
 """
+# Script that runs OpenSim's IMUInverseKinematicsTool.
 TRACK = """
 import opensim
 opensim.Logger.setLevelString("Off")
 assert opensim.IMUInverseKinematicsTool("tool.xml").run()
 """
+# Script that fits orientations, and markers if there are any, with OpenSim.
 SOLVE = """
 import json, os, sys, opensim
 opensim.Logger.setLevelString("Off")

@@ -214,6 +214,6 @@ def test_semi_explicit_steps_are_simbody_s(fixtures, path, until, accuracy):
     assert len(times) == taken + 1
     assert (found.summary["steps"], found.summary["attempted_steps"]) == (taken, attempted)
     own = [*found.values[-1], *found.speeds[-1], *(rows[-1] for rows in found.auxiliary.values())]
-    # Contact amplifies every rounding error about a hundredfold per second. Locked coordinates are
-    # no states in OpenSim, therefore compare each of its states with the nearest of ours.
+    # Contact amplifies every rounding error about a hundredfold per second. The lists of states
+    # differ by locked coordinates: compare each state of OpenSim with the nearest of ours.
     assert max(min(abs(here - there) for here in own) for there in last) < 1e-6

@@ -1,7 +1,8 @@
 """Compare random graphs of bodies and joints with OpenSim: verdicts and accelerations.
 
 Models that OpenSim rejects must have an error, and duplicate joints must be treated as in OpenSim.
-``OSIMLITE_EDITS=2000 OSIMLITE_SEED=7`` sets the number of graphs and the seed.
+The quick suite has 30 graphs, the full one 120. ``OSIMLITE_EDITS=2000 OSIMLITE_SEED=7`` sets their
+number and the seed.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from tests.suite import choose
 pytestmark = pytest.mark.oracle
 
 WANTED = int(os.environ.get("OSIMLITE_EDITS", choose("30", "120")))
+# Number of coordinates of each class of joints.
 COORDINATES = {
     "WeldJoint": 0,
     "PinJoint": 1,
@@ -42,6 +44,7 @@ TURN = """<SpatialTransform><TransformAxis name="rotation1"><coordinates>{}_0</c
     <TransformAxis name="rotation2"><axis>0 1 0</axis></TransformAxis>
     <TransformAxis name="rotation3"><axis>1 0 0</axis></TransformAxis></SpatialTransform>"""
 OFFSET = '<PhysicalOffsetFrame name="{}"><socket_parent>{}</socket_parent></PhysicalOffsetFrame>'
+# Class of a joint, its parent and its child.
 Joint = tuple[str, str, str]
 
 

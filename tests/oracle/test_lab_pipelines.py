@@ -25,6 +25,7 @@ SECOND_MUSCLE = """<DeGrooteFregly2016Muscle name="quad"><max_isometric_force>90
 <PathPoint name="b"><socket_parent_frame>/bodyset/shank</socket_parent_frame><location>0.05 -0.05 0</location>
 </PathPoint></objects></PathPointSet></GeometryPath></path></DeGrooteFregly2016Muscle></objects></ForceSet>
 <MarkerSet>"""
+# Replacement in the model that adds a second muscle.
 MUSCLES = {
     # The second muscle has an equilibrium at all times.
     "one fails": ("</objects></ForceSet>\n<MarkerSet>", SECOND_MUSCLE.format(slack="0.35")),
@@ -118,6 +119,7 @@ COUPLER = (
 <independent_coordinate_names>ja_q</independent_coordinate_names>
 <dependent_coordinate_name>jb_q</dependent_coordinate_name></CoordinateCouplerConstraint>"""
 )
+# Replacements in the model of the closed loop.
 LOOPS = {
     "as it is": [],
     "a longer rod": [
@@ -314,6 +316,7 @@ def test_a_motion_off_the_constraints_is_tracked(tmp_path: Path, setup: str) -> 
 
 
 LOCK = "<locked>true</locked>"
+# Replacements in a model that lock or prescribe coordinates.
 HELD = {
     "lock off the motion": [],
     "another lock": [
@@ -343,6 +346,7 @@ def test_tasks_of_coordinates_that_are_held(tmp_path: Path, held: str) -> None:
     compare_runs(folder, "rra.xml")
 
 
+# Marker without any position in the file, None for markers with gaps only.
 UNSEEN = {"in some frames": None, "in all frames": "ANK", "another in all": "KNE"}
 
 

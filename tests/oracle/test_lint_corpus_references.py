@@ -1,6 +1,6 @@
 """Compare the linter's verdict on broken references of corpus models with OpenSim's.
 
-A quick run has 40 cases, a complete one 120; ``OSIMLITE_BREAKAGES=2000`` sets another number.
+The quick suite has 40 cases, the full one 120. ``OSIMLITE_BREAKAGES=2000`` sets another number.
 """
 
 from __future__ import annotations

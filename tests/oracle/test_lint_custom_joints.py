@@ -61,6 +61,7 @@ def document(
 
 
 ONE = {0: ("a", linear(1, 0))}
+# Custom joints by what is unusual about them.
 CASES = {
     "sound": document("a", ONE),
     "no function": document("a", {0: ("a", "")}),

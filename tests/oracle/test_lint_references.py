@@ -14,9 +14,11 @@ from osimlite.lint import validate
 pytestmark = pytest.mark.oracle
 
 WALKER = Path(__file__).resolve().parents[2] / "fixtures" / "walker" / "DynamicWalkerModel.osim"
+# Elements of the walker whose text names components.
 REFERENCE = re.compile(
     r"<(socket_parent_frame|socket_child_frame|socket_parent|socket_frame|coordinate|geometry)>([^<]+)</"
 )
+# Rules that report broken references.
 CODES = ("OSIM301", "OSIM302", "OSIM303", "OSIM304", "OSIM305", "OSIM402", "OSIM409")
 
 

@@ -59,6 +59,7 @@ THELEN, ACCELERATION = "Thelen2003Muscle", "Millard2012AccelerationMuscle"
 CLASSIC = "<fiber_damping>0</fiber_damping>"
 
 
+# Components that OpenSim rejects, by what is wrong.
 REFUSED = {
     "order": curve(
         "ActiveForceLengthCurve", min_norm_active_fiber_length=0.8, transition_norm_fiber_length=0.7
@@ -128,6 +129,7 @@ REFUSED = {
         "<coordinates>", "<coordinates></coordinates><!--", 1
     ).replace("</coordinates>\n", "-->\n", 1),
 }
+# Similar components that OpenSim accepts.
 TAKEN = {
     "muscle": muscle(""),
     "damped end": curve(

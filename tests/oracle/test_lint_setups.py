@@ -12,6 +12,7 @@ from tests.scripts import run_script
 pytest.importorskip("opensim")
 pytestmark = pytest.mark.oracle
 
+# Setup file of each tool and the table that it writes.
 RESULTS = {
     "InverseDynamicsTool": ("id.xml", "Results/subject01_walk_ID.sto"),
     "InverseKinematicsTool": ("ik.xml", "ik_out.mot"),

@@ -2,8 +2,8 @@
 
 Models that OpenSim rejects must have an error, and no error may claim a rejection that does not
 happen. The models are tested as published, in all versions of the format, and as OpenSim prints
-them. A complete run has a hundred edits; ``OSIMLITE_EDITS=2000 OSIMLITE_SEED=7`` sets their number
-and the seed.
+them. The quick suite has 20 edits, the full one 100. ``OSIMLITE_EDITS=2000 OSIMLITE_SEED=7`` sets
+their number and the seed.
 """
 
 from __future__ import annotations

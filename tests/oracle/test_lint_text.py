@@ -15,6 +15,7 @@ pytestmark = pytest.mark.oracle
 
 HEAD = b'<?xml version="1.0" encoding="UTF-8"?>\n'
 ROOT = b'<OpenSimDocument Version="40600"><Model name="x"><gravity>0 -5 0</gravity></Model></OpenSimDocument>\n'
+# Byte order mark of UTF-8.
 MARK = b"\xef\xbb\xbf"
 
 
@@ -39,6 +40,7 @@ DOCTYPES = {
     + "]>",
 }
 
+# Forms that OpenSim accepts.
 TAKEN = {
     "plain": HEAD + ROOT,
     "no declaration": ROOT,
@@ -70,6 +72,7 @@ TAKEN = {
         b'<OpenSimDocument xmlns:xsi="http://a" xsi:noNamespaceSchemaLocation="b" ',
     ),
 }
+# Forms that OpenSim rejects.
 REFUSED = {
     "text first": b"hello\n" + HEAD + ROOT,
     "text between": HEAD + b"hello\n" + ROOT,

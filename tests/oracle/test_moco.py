@@ -183,6 +183,7 @@ def test_frames_and_expressions(tmp_path):
     assert nearest > 0.2 - 1e-3 and 1.0 < farthest < 1.2 + 1e-3
 
 
+# Class, output, index of the element, exponent, operation and second output of each goal.
 OF_OUTPUTS = [
     ("MocoOutputGoal", "/|com_position", 1, 1, "", ""),
     ("MocoFinalOutputGoal", "/|com_velocity", -1, 2, "", ""),

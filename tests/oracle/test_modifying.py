@@ -27,6 +27,7 @@ processor = opensim.ModelProcessor.safeDownCast(processor)
 processor.process().printToXML("theirs.osim")
 """
 LEGS = ("mtp_r", "subtalar_l")
+# Operators by what they change.
 CASES: dict[str, list[Any]] = {
     "muscles": [
         p.ModOpReplaceMusclesWithDeGrooteFregly2016(),

@@ -18,9 +18,11 @@ from tests.oracle.test_time_ranges import TOOLS, Tool, lay_out_loop, lay_out_sca
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle
 
+# Task of a coordinate that follows a file.
 TASK = """<IKCoordinateTask name="knee_angle"><apply>true</apply><weight>10</weight>
 <value_type>from_file</value_type></IKCoordinateTask></objects></IKTaskSet>
 <coordinate_file>walk.mot</coordinate_file>"""
+# Formats of column labels for the name, path and joint of a coordinate.
 SPELLINGS = {"plain": "{0}", "value": "{1}/value", "path": "{1}", "old": "{2}/{0}/value"}
 
 
@@ -42,6 +44,7 @@ def lay_out_placer(folder: Path) -> None:
     change(folder / "scale.xml", ("</objects></IKTaskSet>", TASK))
 
 
+# Tools that read a motion of coordinates.
 USERS = {
     "IK": TOOLS["IK"]._replace(lay_out=lay_out_task),
     "placer": TOOLS["scale"]._replace(lay_out=lay_out_placer, table="subj_static.mot"),

@@ -13,6 +13,7 @@ from osimlite.simulation.muscle_curves import muscle_curves
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle
 
+# OpenSim's method for each quantity.
 ASKED = {
     "length": "getLength",
     "fiber_length": "getFiberLength",

@@ -39,6 +39,7 @@ VELOCITY = ForceVelocityCurve(
     eccentric_slope_at_vmax=0.05,
     eccentric_curviness=0.5,
 )
+# Muscles with the parameters that make their classes differ.
 MUSCLES = {
     "Thelen": Thelen2003Muscle(pennation_angle_at_optimal=0.3, Af=0.3),
     "damped": Millard2012EquilibriumMuscle(
@@ -227,6 +228,7 @@ def test_a_step_to_where_there_is_no_solution_is_tried_smaller(tmp_path):
             assert values[-1] == pytest.approx(theirs.getStateVariableValue(end, path), rel=1e-9)
 
 
+# Corpus models that are compared completely.
 WHOLE = (
     "gait10dof18musc.osim",
     "gait2392_thelen2003muscle.osim",

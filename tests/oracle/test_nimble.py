@@ -29,6 +29,7 @@ pytestmark = [pytest.mark.full, pytest.mark.oracle]
 DATA = "OSIMLITE_NIMBLE_DATA"
 """Variable that names a checkout of nimblephysics, whose folder `data` has public models and a .b3d file."""
 
+# Number of random states that are compared.
 STATES = 200
 
 MODELS = (

@@ -29,6 +29,7 @@ MORE = """<output_precision>16</output_precision><initial_time>0.1</initial_time
     <AnalysisSet><objects>
         <OutputReporter name="O"><step_interval>2</step_interval><output_paths>{}</output_paths></OutputReporter>
     </objects></AnalysisSet>"""
+# Outputs of stiffness.
 STIFF = ("fiber_stiffness", "fiber_stiffness_along_tendon", "muscle_stiffness", "tendon_stiffness")
 NOT_YET = {*STIFF, "passive_force_multiplier"}
 """Outputs of muscles that osimlite rejects."""

@@ -47,6 +47,7 @@ def answer(code: str, path: Path) -> list[list[float]] | None:
     return json.loads(done.stdout.splitlines()[-1]) if done.returncode == 0 else None
 
 
+# Script that computes the length of a path at several coordinates with OpenSim.
 LENGTHS = """
 s = m.initSystem()
 path, x, rows = o.PathSpring.safeDownCast(m.getForceSet().get(0)).getGeometryPath(), m.getCoordinateSet().get(0), []
@@ -119,6 +120,7 @@ def test_ranges_of_wraps(tmp_path: Path, ranges: list[str], count: int) -> None:
         assert next(iter(arms.values())) == pytest.approx(arm, abs=1e-9)
 
 
+# Script that computes lengths at `POSES` and simulates the model with OpenSim.
 RUN = """
 s = m.initSystem()
 path, (x, y) = o.GeometryPath.safeDownCast(m.getComponent("/forceset/f/path")), m.getCoordinateSet()

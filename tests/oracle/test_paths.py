@@ -159,6 +159,7 @@ def test_points_that_move_or_come_and_go(model, tmp_path):
     assert compare(with_springs(model), tmp_path, counted=0)
 
 
+# Couplers of each case: independent coordinate by dependent coordinate.
 COUPLERS = {
     "no constraint": {},
     "a coupler": {"q2_0": "q0_0"},

@@ -22,6 +22,7 @@ pytestmark = pytest.mark.oracle
 pytest.importorskip("opensim")
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "plugin-classes.md"
+# OpenSim classes with different types of properties.
 CLASSES = (
     "PathSpring", "PointToPointSpring", "ToyPropMyoController", "CustomJoint", "HopperDevice", "Marker", "SimmSpline",
     "Millard2012EquilibriumMuscle", "Thelen2003Muscle", "ExternalForce", "Kinematics",

@@ -22,6 +22,7 @@ pytestmark = [
 ]
 
 
+# Script that evaluates the objective terms with OpenSim's Moco.
 MOCO = """
 import json
 import opensim as osim
@@ -31,6 +32,7 @@ solution.unseal()
 solution.write("theirs.sto")
 print(json.dumps({name: solution.getObjectiveTerm(name) for name in solution.getObjectiveTermNames()}))
 """
+# Script that evaluates the objective terms with osimlite.
 OURS = """
 import json
 from osimlite import moco

@@ -112,6 +112,7 @@ MUSCLES = {
     "degroote": (DeGrooteFregly2016Muscle, {"tendon_compliance_dynamics_mode": "implicit"}),
     "rigid": (RigidTendonMuscle, {}),
 }
+# Properties of metabolic probes of both classes.
 SWITCHES: tuple[dict[str, object], ...] = (
     {},
     {"report_total_metabolics_only": False},
@@ -125,6 +126,7 @@ SWITCHES: tuple[dict[str, object], ...] = (
     {"shortening_rate_on": False, "muscle_effort_scaling_factor": 0.7, "basal_exponent": 0.5},
     {"mechanical_work_rate_on": False, "basal_coefficient": 2.0},
 )
+# Properties that only one of the two classes has.
 OF_UMBERGER = (
     {"use_Bhargava_recruitment_model": False, "aerobic_factor": 1.0},
     {"activation_maintenance_rate_on": False, "forbid_negative_total_power": False},

@@ -17,6 +17,7 @@ pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle'
 pytestmark = pytest.mark.oracle
 
 GAIT10, GAIT2354 = "gait10_subject01", "gait2354_subject01_simbody"
+# Tool, setup, model and motion of each case.
 CASES = {
     "walk": (
         "InverseDynamicsTool",

@@ -1,8 +1,8 @@
 """Compare the linter's findings in projects with one random fault with what OpenSim's tools do.
 
 Where OpenSim rejects the project or crashes, there must be a finding at the fault. Where it
-computes the same results, no finding may claim a rejection. The default are twenty faults;
-``OSIMLITE_FAULTS=1000 OSIMLITE_SEED=7`` sets their number and the seed.
+computes the same results, no finding may claim a rejection. The quick suite has 6 faults, the full
+one 40. ``OSIMLITE_FAULTS=1000 OSIMLITE_SEED=7`` sets their number and the seed.
 """
 
 from __future__ import annotations

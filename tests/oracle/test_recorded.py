@@ -107,7 +107,9 @@ def test_inverse_dynamics_beyond_the_forces_of_the_model(
     assert np.abs(ours.rows - alone.rows).max() > 1.0
 
 
+# Times with uneven steps (s).
 UNEVEN = np.sort(np.r_[np.linspace(0.0, 1.0, 41), 0.013, 0.4801, 0.777])
+# Times that are rounded to microseconds, as in files (s).
 DECIMAL = np.round(np.arange(151) / 150.0, 6)
 
 

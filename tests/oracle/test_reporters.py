@@ -26,8 +26,10 @@ from tests.scripts import run_script  # noqa: E402
 
 REPORTERS = """<StatesReporter name="S"/><Actuation name="A"/><ProbeReporter name="P"/>
     <ProbeReporter name="Some"><step_interval>3</step_interval></ProbeReporter>"""
+# Setup of an analysis along a prescribed motion.
 KNOWN = """<output_precision>16</output_precision><initial_time>0.1</initial_time><final_time>0.2</final_time>
     <AnalysisSet><objects>{objects}</objects></AnalysisSet>"""
+# Setup of a forward simulation with analyses.
 FORWARD = """<OpenSimDocument Version="40600">
     <ForwardTool name="it">
         <model_file>model.osim</model_file>

@@ -243,6 +243,7 @@ MORE = """<Kinematics name="K"/><BodyKinematics name="B"/>
     <ForceReporter name="F"><start_time>0.01</start_time><end_time>0.012</end_time><step_interval>4</step_interval>
     </ForceReporter>"""
 STARTED = ("arm_init.sto", "start/arm26_states.sto")
+# Replacements in the setup of a forward simulation.
 CHANGES: dict[str, list[tuple[str, str]]] = {
     "longest step": [("size>       1.0", "size> 0.001")],
     "equilibrium": [("auxiliary_states> false", "auxiliary_states> true"), (" 0.02 ", " 0.1 ")],

@@ -113,6 +113,7 @@ def tumbling():
     return model
 
 
+# Initial value and speed of coordinates.
 START = {
     "rx": (0.2, 1.0),
     "rz": (0.3, -2.0),

@@ -21,6 +21,7 @@ opensim = pytest.importorskip("opensim", reason="needs the opensim package (extr
 pytestmark = pytest.mark.oracle
 
 CLASSES = ("Thelen2003Muscle", "Millard2012EquilibriumMuscle", "DeGrooteFregly2016Muscle")
+# Properties that the new muscles take from the old ones.
 KEPT = ("max_isometric_force", "optimal_fiber_length", "tendon_slack_length", "pennation_angle_at_optimal",
         "min_control", "max_control", "geometry_path")  # fmt: skip
 

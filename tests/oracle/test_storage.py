@@ -11,6 +11,7 @@ from osimlite.simulation import read_sto, write_sto
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle
 
+# Suffix of OpenSim's table class and numbers per column, by type of data.
 KINDS = {
     "double": ("", 1),
     "Vec3": ("Vec3", 3),

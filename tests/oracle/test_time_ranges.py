@@ -114,6 +114,7 @@ def lay_out_states(folder: Path) -> None:
 
 
 KINEMATICS = "kin_BodyKinematics_pos_global.sto"
+# Tools under test.
 TOOLS = {
     "IK": Tool(
         lay_out_lab("unseen"), "ik.xml", "InverseKinematicsTool", ("0.01", "0.03"), "ik.mot"

@@ -16,6 +16,7 @@ from tests.suite import choose
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle
 
+# Coordinates that are tracked.
 COORDINATES = ("pelvis_tx", "pelvis_ty", "pelvis_tilt", "hip_flexion_r", "knee_angle_r", "ankle_angle_r",
                "hip_flexion_l", "knee_angle_l", "ankle_angle_l", "lumbar_extension")  # fmt: skip
 TASK = """<CMC_Joint name="{name}">

@@ -21,6 +21,7 @@ MODELS = {
     "m0001": "Thelen2003Muscle",
     "m0005": "Millard2012EquilibriumMuscle, a whole body",
 }
+# Motion types in the order of OpenSim's enumeration.
 MOTIONS = ("undefined", "rotational", "translational", "coupled")
 
 

@@ -23,6 +23,7 @@ pytestmark = [pytest.mark.oracle, pytest.mark.timeout(900)]
 
 MINUTE = 60.0 if "OSIMLITE_ALL_MODELS" in os.environ else choose(4.0, 12.0)
 """Duration of a walk (s); OSIMLITE_ALL_MODELS=1 walks a minute, which takes OpenSim half a minute."""
+# Simulated time (s) of each walker.
 LONG = {"steady-walker": MINUTE, "human-walker": MINUTE, "furthest-walker": 5.0}
 ACCURACY = {"steady-walker": 1e-8, "human-walker": 1e-6, "furthest-walker": 1e-8}
 """Accuracy of the integrators; at a finer one OpenSim is slow for the human walker's stiff knee stops."""

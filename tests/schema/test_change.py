@@ -20,6 +20,7 @@ def carrying():
     return model
 
 
+# Ways to change a model.
 CHANGES = {
     "a field": lambda model: setattr(model["/bodyset/b"], "mass", 2.0),
     "a name": lambda model: setattr(model["/bodyset/b"], "name", "c"),

@@ -18,6 +18,7 @@ from osimlite.schema.registry import MODULES
 from osimlite.schema.specs import FieldSpec
 from tests.cases import of_each
 
+# Largest number of characters of a description.
 LONGEST = 140
 
 CLASSES: list[type[Object]] = [

@@ -16,6 +16,7 @@ from osimlite.schema.muscles import Muscle
 from osimlite.schema.registry import MODULES
 from tests.lint.verdict_cases import path_of, small_model
 
+# How a fact of the base class applies to a derived class.
 UNUSED, HOLDS = "the class never uses the property", "the fact holds for the class"
 
 MUSCLES = (
@@ -47,6 +48,8 @@ INHERITED = {
 }
 """Inherited facts about numbers outside of their domain, by class and property."""
 
+# Parameters of MuJoCo's muscle: largest velocity, eccentric force, and time constants of
+# activation.
 NUMBERS = {"vmax", "fvmax", "rise", "fall"}
 NOT_THERE = {
     "DeGrooteFregly2016Muscle": {"fvmax"},

@@ -141,6 +141,7 @@ def _change(**values: object) -> bytes:
 
 VERSION_1 = files.encode_bytes(10, b"walking") + b"\x68\x01"
 VERSION_3 = files.encode_varint(17 << 3 | 1) + b"\0" * 8 + b"\x50\x03"
+# Contents of damaged files, each with the message that it must give.
 DAMAGED = {
     "empty": (b"", "this is not a .b3d file"),
     "short": (b"\x01\0\0", "this is not a .b3d file"),

@@ -121,6 +121,7 @@ def _recode(data: bytes, random: Random) -> bytes:
     return data.decode("utf-8", "replace").encode(coding, "replace")
 
 
+# All kinds of damage.
 WAYS = (
     _truncate, _headless, _change_bytes, _cut, _repeat, _insert, _rename_tag, _rename_everywhere, _move_element,
     _drop_element, _change_word, _change_version, _nest, _recode,

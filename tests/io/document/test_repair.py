@@ -236,7 +236,7 @@ def test_what_is_recovered_of_an_old_document_is_upgraded() -> None:
     assert result.document.notes == []
 
 
-# Nothing hangs on any text
+# The reader ends soon on any text
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ from osimlite.errors import OsimliteError
 from osimlite.io.meshes.surface import Surface, triangulate
 from osimlite.io.meshes.vtp import read_vtp
 
+# Names of fixtures that VTK has written, by format of the data.
 WRITTEN_BY_VTK = (
     "ascii",
     "binary",

@@ -10,6 +10,7 @@ from osimlite.io.tables.storage import StoTable
 
 RNG = np.random.default_rng(7)
 PLAIN = RNG.normal(0.0, 100.0, (300, 7))
+# Numbers at the limits of rounding and of the width of a column.
 ODD = np.array(
     [[0.0, -0.0, -1e-9, 1e-320, 0.99999999499999, 9998.999999999, np.nextafter(9999.0, 0.0)]]
 )
