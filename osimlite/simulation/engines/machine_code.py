@@ -12,7 +12,7 @@ import os
 import platform
 from collections.abc import Iterable, Mapping, Sequence
 
-from osimlite.base.text import suggest_or_list
+from osimlite.base.text import format_count, suggest_or_list
 from osimlite.errors import OsimliteError
 from osimlite.mechanics.codegen.toolchain import CompilationError, find_compiler
 from osimlite.simulation.elements.laws import find_law
@@ -184,8 +184,8 @@ def explain_source() -> list[str]:
         if library.changed_files:
             count = len(library.changed_files)
             sentences.append(
-                f"{count} source files of this library were changed after it was compiled: kernels from them are "
-                "compiled again at their first use; 'pip install -e .' compiles a new library"
+                f"{format_count(count, 'source file')} changed after the library was compiled: edited kernels are compiled "
+                "again at their first use; 'pip install -e .' compiles a new library"
             )
     elif is_allowed(LIBRARY):
         sentences.append(kernel_library.explain_absence())
