@@ -155,7 +155,7 @@ def test_a_library_of_older_sources_is_reported(sources):
     add_library(sources)
     sources.setattr(Library, "changed_files", ["kernels/dynamics.py"])
     assert any(
-        "1 of its source files" in line and "pip install -e ." in line
+        "1 source file changed" in line and "pip install -e ." in line
         for line in machine_code.explain_source()
     )
 
