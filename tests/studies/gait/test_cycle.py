@@ -1,4 +1,4 @@
-"""The step map, its fixed points, and what is around them, on the walkers of the library."""
+"""Tests of the step map, its fixed points and their multipliers, on built-in walkers."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def test_the_steady_walker_walks_in_a_stable_cycle(steady):
     cycle = steady.cycle
     assert cycle.residual < 1e-9 and cycle.scuffs == 0 and not cycle.per_stride
     assert (cycle.length, cycle.period) == pytest.approx((0.624382, 0.816599), abs=2e-6)
-    # Feet roll on while they stand: a walker gets further than from foot to foot.
+    # Feet roll while they stand, so a walker advances by more than the distance between its feet.
     (walk,) = walk_many(steady.engine, steady.start[None], 20.0, accuracy=1e-8)
     first, *_, last = walk.steps
     x = steady.names.index("Pelvis_tx")
@@ -52,12 +52,12 @@ def test_the_steady_walker_walks_in_a_stable_cycle(steady):
     )
     assert cycle.largest == pytest.approx(0.5659, abs=2e-3) and cycle.largest < 0.6
     assert len(cycle.multipliers) == 11 and cycle.neutral == 3
-    # Along the motion itself the section has no extent.
+    # The section has no extent along the motion, so one multiplier is zero.
     assert np.abs(cycle.multipliers).min() < 1e-4
 
 
 def test_a_walker_comes_back_as_the_derivative_says(steady):
-    """Near the cycle the map is its derivative, whose eigenvalues are the multipliers."""
+    """Near the cycle the map is linear, and the eigenvalues of its derivative are the multipliers."""
     step_map, cycle = steady.step_map, steady.cycle
     slope = differentiate_step_map(step_map, cycle.state)
     assert np.sort(np.abs(np.linalg.eigvals(slope))) == pytest.approx(
@@ -68,7 +68,7 @@ def test_a_walker_comes_back_as_the_derivative_says(steady):
     for _ in range(8):
         y, expected = step_map(y).states, slope @ expected
         result = step_map.reduce(y[0]) - step_map.reduce(cycle.state)
-        # The push grows a hundredfold before it dies away, and may pass near zero on the way.
+        # The perturbation grows a hundredfold before it decays, and may pass near zero on the way.
         assert np.linalg.norm(result - expected) < 0.01 * np.linalg.norm(
             expected
         ) + 0.1 * np.linalg.norm(away)
@@ -110,7 +110,7 @@ def step_map_image(steady):
 
 
 def test_a_varied_map_is_that_of_the_other_model(steady):
-    """Its reduced states lie along nearly the same directions, where those of a new map may be turned."""
+    """The basis of its reduced states is nearly that of the original map, while a new map may have a rotated basis."""
     with Simulation(steady_walker(foot_ahead=0.073), "compiled") as simulation:
         new = StepMap(simulation.engine, simulation.initial_state({}, {}))
         varied = steady.step_map.rebuild_for_model(
@@ -173,7 +173,7 @@ def test_the_human_walker_walks_from_two_digits():
 
 
 def test_the_steady_walker_differs_in_two_properties():
-    """Besides its start, the way that is ready for it, and its name."""
+    """Besides the inertia of shanks and the position of feet, only start, platform length and name differ."""
     theirs, ours = (
         {part.path: part for part in model.components()}
         for model in (dynamic_walker(), steady_walker())
@@ -201,7 +201,7 @@ def test_who_makes_no_step_has_no_map():
 
 
 def test_the_command(tmp_path, monkeypatch):
-    # Paths are never broken: a long folder would make long lines.
+    # Paths are never wrapped: a long folder would make long lines.
     monkeypatch.chdir(tmp_path)
     words = "gait steady-walker --to 5 --perturb 0.05 --starts 4 --steps 3 --basin --grid 2 --reach 0.01 --no-pictures"
     done = CliRunner().invoke(create_app(["gait"]), [*words.split(), "-o", "."])

@@ -1,4 +1,4 @@
-"""The search for walkers that never stop, in narrow ranges around one that is known."""
+"""Tests of the search for walkers with gait cycles, in narrow ranges around a known walker."""
 
 from __future__ import annotations
 
@@ -164,7 +164,7 @@ def test_what_cannot_be_searched_leaves_no_folder(tmp_path):
 
 @pytest.mark.full
 def test_more_of_them_walk_where_a_cycle_costs_less():
-    """Below what is stable enough, the cost is less by the part that walks."""
+    """For sufficiently stable cycles, the fraction of walkers that keep walking decreases the cost."""
     search = CycleSearch(plan(dynamic_walker(), NEAR), stable=1.0, perturb=0.02)
     with Simulation(steady_walker(), "compiled") as simulation:
         cycle = find_cycle(StepMap(simulation.engine, simulation.initial_state({}, {})))
@@ -188,7 +188,7 @@ def test_rounded_numbers_have_no_noise_in_the_last_bit():
 
 
 def test_random_walkers_do_not_depend_on_the_numbers_that_are_searched():
-    """Not by a rounding either: a search from the walker that it found before finds it again."""
+    """Results are equal to the last bit, so that a search that starts from a walker found before finds it again."""
     ranges = {"slope": (2.0, 3.5), "foot_radius": (0.1, 0.2)} | {
         name: (-0.3, 0.3) for name in JOINTS
     }
@@ -208,7 +208,7 @@ def test_random_walkers_do_not_depend_on_the_numbers_that_are_searched():
 
 
 class Valley:
-    """Cycles whose largest multiplier is a narrow, slanting valley of two numbers, with its end at (0.8, 0.8)."""
+    """Search whose largest multiplier is a narrow, slanting valley of two variables that ends at (0.8, 0.8)."""
 
     stable = 0.5
 
@@ -229,7 +229,7 @@ class Valley:
 
 
 def test_a_narrow_valley_is_followed_to_rounded_numbers():
-    """It follows the narrow valley without rounding, and rounds where it is wide enough for that."""
+    """The optimization follows the narrow valley without rounding, and rounds where it is wide enough."""
     valley = Valley()
     first = valley.find_cycle(np.array([0.3111, 0.3113]), np.zeros(2))
     improvement = StabilityOptimization(valley, first, 2)

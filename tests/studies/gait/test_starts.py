@@ -1,4 +1,4 @@
-"""Putting walkers on their feet."""
+"""Tests of placing walkers on their feet."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def test_the_pelvis_carries_the_walker(walker):
 
 @pytest.mark.parametrize("slope", [None, 2.0, 25.0])
 def test_a_planted_foot_touches_and_rests(walker, states, slope):
-    """The joint of the pelvis is turned with the slope, so that other ways carry a walker on another slope."""
+    """The joint of the pelvis rotates with the slope, so that neutral directions differ between slopes."""
     footing, numbers, rows = find_footing(walker), None, np.arange(len(states))
     if slope is not None:
         with Simulation(dynamic_walker(slope=slope), "compiled") as simulation:
@@ -78,7 +78,7 @@ def test_one_foot_is_put_as_deep_as_it_is_wanted(walker, states):
 
 
 def test_upright_takes_away_what_does_not_matter():
-    """The first entry that a direction changes becomes zero; what it does not change stays."""
+    """The first entry that a neutral direction changes becomes zero; entries that none changes stay."""
     neutral = np.array([[0.0, 1.0, 0.0, 2.0], [0.0, 0.0, 3.0, -3.0]]).T
     moved = move_along_neutral_directions(np.array([[5.0, 1.0, 2.0, 3.0]]), neutral)
     assert moved == pytest.approx(np.array([[5.0, 0.0, 0.0, 3.0 - 2.0 + 2.0]]))

@@ -1,4 +1,4 @@
-"""Walkers whose forces have states of their own: what the legs exchange, and what leaves the walk alone."""
+"""Tests of walkers whose forces have states: exchange of the states of both legs, and neutral states."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from osimlite.studies.gait.symmetry import match_auxiliary_states
 
 
 def test_a_walker_that_counts_energy_walks_as_before():
-    """The counts are neutral, each is exchanged for the other leg's, and all go on from step to step."""
+    """Counters of energy are neutral, are exchanged between the legs, and grow from step to step."""
     maps, cycles = [], []
     for counts in (False, True):
         model = steady_walker()
@@ -55,7 +55,7 @@ def test_a_walker_that_counts_energy_walks_as_before():
 
 
 def test_states_that_push_are_exchanged_by_what_they_do():
-    """Two alike on either leg, of which one acts and one does not, and one in the middle."""
+    """Each leg has two similar states, only one of which has an effect; a fifth state belongs to neither leg."""
     drive = np.array([0.3, 0.3, 0.3, 0.3, 0.7])
 
     def derivative(t, y):

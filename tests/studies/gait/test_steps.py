@@ -1,4 +1,4 @@
-"""Steps, scuffs and falls, on motions whose contacts are known."""
+"""Tests of the detection of steps, scuffs and falls, on motions with known contacts."""
 
 from __future__ import annotations
 
@@ -80,13 +80,13 @@ def test_the_exercise_falls_on_its_knee_without_a_step(engine):
 
 
 def test_places_along_the_slope(engine):
-    """Moving the pelvis along the platform moves every sphere as far, but for how the plane lies."""
+    """Moving the pelvis along the platform moves all spheres alike, apart from the angle of the plane."""
     one = start_of(engine)
     other = one.copy()
     place = engine.order.index(engine.mechanism.coordinate_index("Pelvis_tx"))
     other[place] += 0.25
     along, depth = measure_along_slope(engine, np.array([one, other]))
-    angle = np.pi / 2 - 1.57  # the exercise's plane is that much off the platform
+    angle = np.pi / 2 - 1.57  # angle between the exercise's plane and the platform
     assert along[1] - along[0] == pytest.approx(np.full(6, 0.25 * np.cos(angle)), abs=1e-12)
     assert depth[1] - depth[0] == pytest.approx(np.full(6, 0.25 * np.sin(angle)), abs=1e-12)
     plane = next(
@@ -117,7 +117,7 @@ def test_what_is_a_step():
             (0.0, left, False),
             (0.5, left, True),  # a step of 0.3 m
             (0.6, right, False),
-            (0.62, right, True),  # too soon
+            (0.62, right, True),  # too early
             (0.63, right, False),
             (0.9, right, True),  # not far enough ahead
             (0.91, right, False),

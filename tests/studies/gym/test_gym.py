@@ -1,4 +1,4 @@
-"""Environments of gymnasium: what its checker says, seeds, and many copies beside single ones."""
+"""Tests of the environments for gymnasium: its checker, seeds, and vector environments against single ones."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_gymnasium_finds_nothing_wrong(name: str) -> None:
     ],
 )
 def test_copies_are_single_environments_bit_for_bit(name: str, count: int, integrator: str) -> None:
-    """Through episodes that end and begin anew, beside another environment of the same model."""
+    """Compare over episodes that end and restart, next to another environment of the same model."""
     task = replace(TASKS[name](), integrator=integrator, seconds=0.2)
     many, another, one = MuscleVectorEnv(count, task), MuscleVectorEnv(2, task), MuscleEnv(task)
     rng = np.random.default_rng(0)
@@ -65,7 +65,7 @@ def test_copies_are_single_environments_bit_for_bit(name: str, count: int, integ
 
 
 def test_steps_go_by_the_integrator_of_the_task() -> None:
-    """The same motion, but for the error of the methods."""
+    """The motions differ by the errors of the integrators only."""
     ends = {}
     for name in INTEGRATORS:
         env = MuscleEnv(replace(TASKS["Arm-v0"](), integrator=name, accuracy=1e-6))

@@ -1,4 +1,4 @@
-"""A linear feedback for the arm is learnt by an evolution strategy."""
+"""Test that an evolution strategy learns a linear feedback for the arm."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import osimlite.studies.gym  # noqa: E402, F401
 
 @pytest.mark.full
 def test_the_arm_learns_to_hold_the_weight() -> None:
-    # Not above: each process that collects this module would load it, which takes seconds.
+    # Import here: each process that collects this module would load it, which takes seconds.
     cma = pytest.importorskip("cma", reason="needs cma (extra 'optimize')")
     envs = gymnasium.make_vec("osimlite/Arm-v0", num_envs=4)
     size = envs.single_observation_space.shape[0]

@@ -1,4 +1,4 @@
-"""Reflexes that drive the actuators of simulations, and noise."""
+"""Tests of reflexes and noise that control the actuators of simulations."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ SOUGHT: dict[str, Any] = {
 }  # fmt: skip
 STEP = 0.005
 simulate: Any = osimlite.simulate
-"""With a controller its trajectory has a table of that."""
+"""Without a static type: its trajectories have the attribute `controller` only with a controller."""
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +70,7 @@ def test_controls_are_sums_of_what_was_felt(model) -> None:
     moved = simulate(model, 0.3, controller=feedback, report_interval=STEP)
     told, count = moved.controller, 61
     assert told.times == pytest.approx(STEP * np.arange(count), abs=0.0)
-    # What it felt is what was there.
+    # The recorded sensors equal the values of the motion.
     assert told["elbow.value"] == pytest.approx(moved.values[:, -1], abs=1e-15)
     strength = model.tree().by_path["/forceset/flexor"].max_isometric_force
     assert told["forceset/flexor.force"] == pytest.approx(
@@ -106,7 +106,7 @@ def test_what_was_interrupted_goes_on(model) -> None:
 
 
 def test_a_record_ends_with_the_motion(model, monkeypatch) -> None:
-    """A signal may come when control steps are recorded whose states are not kept."""
+    """An interruption may come after control steps were recorded but before their states."""
     seen, table = [], ControllerRuns.table
 
     def noted(self: ControllerRuns, *end: float) -> Any:
@@ -142,7 +142,7 @@ def test_runs_go_on_bit_for_bit(model, integrator, tmp_path) -> None:
 
 
 def test_a_human_goes_on_in_the_midst_of_a_walk(tmp_path) -> None:
-    """With states of legs, contact, delays of several control steps."""
+    """Continue with states of the legs, contact, and delays of several control steps."""
     file = write_scenario(tmp_path)
     scenario = Scenario(file)
     start = scenario.walk(scenario.best(), duration=0.005).states
@@ -158,7 +158,7 @@ def test_a_human_goes_on_in_the_midst_of_a_walk(tmp_path) -> None:
     first = simulate(scenario.model, 0.75, initial=initial, **choices)
     second = simulate(scenario.model, 2.0, resume=first, **choices)
     assert np.array_equal(second.states.rows, whole.states.rows[15:])
-    # Events are those of the whole.
+    # The contact events are those of the complete run.
     events = [each for each in whole.summary["contact_events"] if each["time_s"] > 0.75]
     begun = [each for each in second.summary["contact_events"] if each["time_s"] > 0.75]
     assert [each["contact"] for each in begun] == [each["contact"] for each in events]
@@ -195,10 +195,10 @@ def test_motors_are_driven_beside_what_else_drives(model) -> None:
     )
     told = moved.controller["/forceset/motor"]
     assert told[0] == 0.5 and told.min() < 0.49 and len(told) == 251
-    # What the motor pushes is what it is driven by, also between the control steps.
+    # The motor's force follows its control, also between control steps.
     expected = 2.0 * (0.3 + told[::5])
     assert moved.forces["motor"] == pytest.approx(expected, abs=1e-12)
-    # The same controls without a controller are the same motion.
+    # Prescribing the recorded controls gives the same motion.
     held = osimlite.PiecewiseConstantFunction(x=tuple(moved.controller.times), y=tuple(0.3 + told))
     again = simulate(model, 0.5, controls={"flexor": 0.1, "motor": held}, accuracy=1e-7)
     assert again.values == pytest.approx(moved.values, abs=2e-5)
@@ -354,7 +354,7 @@ def test_values_of_nothing_are_refused(model) -> None:
     ],
 )
 def test_philox_is_that_of_its_authors(counter, key, words) -> None:
-    """Their own numbers (Random123, kat_vectors)."""
+    """The expected words are published with Random123 (kat_vectors)."""
     assert philox(*counter, *key) == words
 
 
@@ -393,7 +393,7 @@ def test_noise_is_as_large_as_it_is_asked_for(model) -> None:
 
 
 def test_what_no_reflex_drives_has_noise_too(model) -> None:
-    """As in SCONE; noise in proportion to no control is none."""
+    """This is as in SCONE; noise in proportion to a control of zero is zero."""
     one = {"dual_sided": 0, "DofReflex": {"target": "flexor", "source": "elbow", "KP": 1}}
     for noise, drives in (({"base_noise": 5.0}, True), ({"proportional_noise": 5.0}, False)):
         both = {"CompositeController": {"ReflexController": one, "NoiseController": noise}}
@@ -404,7 +404,7 @@ def test_what_no_reflex_drives_has_noise_too(model) -> None:
 
 
 def test_seeds_are_exact(model) -> None:
-    """Also of a run that goes on."""
+    """This also holds for a run that continues another one."""
     runs = [
         simulate(model, 0.2, controller=noisy(base_noise=0.05, random_seed=seed))
         for seed in (1, 1, 2)
@@ -440,7 +440,7 @@ def test_noisy_walks_alone_are_those_among_many(tmp_path) -> None:
 
 # ------------------------------------------------------------------------------------------------------------- sweeps
 def test_many_runs_are_single_ones_bit_for_bit(model) -> None:
-    """Also where each has muscles of its own, by which forces are measured; in any block and on any thread."""
+    """This also holds with different muscles, which scale the sensors of force, in any block and on any thread."""
     from osimlite.studies.sweep.plan import plan
     from osimlite.studies.sweep.runner import Runner
 
@@ -495,7 +495,7 @@ def test_sweeps_go_by_a_file(model, tmp_path) -> None:
 
 
 def test_kernels_as_python_go_likewise(model, monkeypatch) -> None:
-    """Where a place outside an array is an error."""
+    """Vectors with bounds raise an error for indices outside."""
     from tests.simulation.checked import Checked
 
     feedback = noisy(base_noise=0.01, sensor_noise=0.01)
@@ -509,7 +509,7 @@ def test_kernels_as_python_go_likewise(model, monkeypatch) -> None:
 
 
 def test_gains_of_many_runs_are_those_of_single_ones_bit_for_bit(model) -> None:
-    """Also with delays that differ, and beside other numbers of the model."""
+    """This also holds with different delays, and next to other variables of the model."""
     from osimlite.studies.sweep.plan import plan
     from osimlite.studies.sweep.runner import Runner
 
@@ -543,7 +543,7 @@ def test_gains_of_many_runs_are_those_of_single_ones_bit_for_bit(model) -> None:
 
 
 def test_a_search_for_gains(model, tmp_path) -> None:
-    """What it finds is a file of parameters, and what goes by it is as good."""
+    """The result is a file of parameters, with which a simulation has the same cost."""
     pytest.importorskip("yaml", reason="needs PyYAML (extra 'yaml')")
     pytest.importorskip("pyarrow", reason="needs pyarrow (extra 'sweep')")
     import json

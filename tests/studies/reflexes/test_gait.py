@@ -1,4 +1,4 @@
-"""The numbers that gaits are compared by."""
+"""Tests of the quantities that describe gaits."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ TIMES: Any = np.linspace(0.0, 9.99, 1000)
 
 
 def loads_of(phase) -> Any:
-    """Two humps of 1.2 and 1.0 in the first 60 of 100 rows of a stride."""
+    """Return loads with peaks of 1.2 and 1.0 in the first 60 of 100 rows of each stride."""
     place = (np.arange(1000) - phase) % 100
     return np.where(place < 60, np.where(place == 15, 1.2, np.where(place == 45, 1.0, 0.6)), 0.0)
 
@@ -64,7 +64,7 @@ def test_our_human_s_gait(tmp_path) -> None:
         list(told) == ["distance", "heights", "strides", "stance", "ground"]
         and "weights" in told["ground"]
     )
-    # What muscles take, by two measures, is told once.
+    # The metabolic power and the cost of transport are reported by two measures, and agree.
     assert walked.report["transport"] == pytest.approx(
         walked.report["power"] / gait.speed, rel=0.05
     )

@@ -1,4 +1,4 @@
-"""Jumps, by functions of time instead of reflexes."""
+"""Tests of jumps that functions of time control instead of reflexes."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ PUSHES = {
     }.items()
     for name, value in zip(("Y0", "Y1", "DT0"), values, strict=True)
 }  # fmt: skip
-"""Of a jump that a search has found."""
+"""Parameters of a jump that a search has found."""
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +68,18 @@ def scenario(folder, *changes: tuple[str, str]) -> Scenario:
 def judged(
     walked, given: Scenario, prepare: float, least: float, at_peak: bool
 ) -> tuple[float, int]:
-    """SCONE's measure of a jump, and the control step it ends after, from the motion."""
+    """Compute SCONE's measure of a jump from its motion.
+
+    Args:
+        walked: result of the simulation.
+        given: scenario.
+        prepare: time of preparation (s).
+        least: fraction of the initial height below which the jump ends.
+        at_peak: whether the jump ends at the highest position.
+
+    Returns:
+        The measure, and the control step after which the jump ends.
+    """
     walkers, table = given.get_walkers(1), walked.states
     states = np.empty_like(table.rows)
     states[:, [walkers.offsets[path] for path in table.columns]] = table.rows
@@ -101,7 +112,7 @@ def judged(
         ((), PUSHES, True),
         ((("prepare_time = 0.2", "prepare_time = 0.4"),), PUSHES, True),
         ((("prepare_time = 0.2", "prepare_time = 0.2 terminate_on_peak = 0"),), PUSHES, False),
-        # The first sinks in its time to prepare, the second comes down without a flight.
+        # The first case sinks during the preparation, the second comes down without a flight.
         ((), {name: 0.01 for name in PUSHES if "Y" in name}, True),
         ((), {}, True),
     ],
@@ -112,7 +123,7 @@ def test_a_jump_is_as_high_as_the_mass_centre_comes(folder, changes, values, at_
     prepare = 0.4 if changes and "0.4" in changes[0][1] else 0.2
     expected, end = judged(walked, given, prepare, 0.75, at_peak)
     assert walked.terms["JumpMeasure"][0] == pytest.approx(expected, rel=1e-9)
-    # A jump is to be large, and what is searched for small.
+    # The height is maximized, and the search minimizes.
     assert walked.results[0] == -walked.terms["JumpMeasure"][0]
     assert walked.times[0] == pytest.approx(end * STEP, abs=1e-12)
     if values is PUSHES and not changes:
@@ -184,7 +195,7 @@ def test_a_search_finds_higher_jumps(folder, tmp_path) -> None:
 
 @pytest.mark.full
 def test_kernels_as_python_jump_likewise(folder, monkeypatch) -> None:
-    """Where a place outside an array is an error."""
+    """Vectors with bounds raise an error for indices outside."""
     from tests.simulation.checked import Checked
 
     compiled, plain = (
@@ -239,7 +250,7 @@ def test_actuators_are_driven_by_functions_of_time(form) -> None:
         np.clip(expected(told.times), 0.0, 1.0), abs=1e-12
     )
     assert (told["/forceset/extensor"] == 0.0).all() and len(told.times) == 61
-    # A run that goes on knows the time.
+    # A run that continues another one keeps its time.
     again = simulate(
         model, 0.3, controller=feedback, resume=simulate(model, 0.1, controller=feedback)
     )
@@ -250,7 +261,7 @@ def test_actuators_are_driven_by_functions_of_time(form) -> None:
 
 @pytest.mark.filterwarnings("ignore:noise is as large")
 def test_functions_go_with_reflexes_and_noise(folder) -> None:
-    """What one says alone is added to what the others say, and each side can have its own."""
+    """Contributions are added, and each side can have its own function."""
     constant = (
         "PieceWiseConstant { control_points = 2 control_point_y = 0.3 control_point_dt = 0.03 }"
     )
@@ -334,7 +345,7 @@ def test_functions_go_with_reflexes_and_noise(folder) -> None:
 def test_what_is_not_done_is_refused_by_name(folder, old, new, words) -> None:
     given = SCENARIO.split("\n")
     if new.endswith("#"):
-        # The rest of the block is left out.
+        # Leave out the rest of the block.
         first = next(k for k, line in enumerate(given) if "PieceWiseConstant" in line)
         given[first : first + 5] = [new[:-1]]
     text = "\n".join(given) if new.endswith("#") else SCENARIO.replace(old, new)

@@ -1,4 +1,4 @@
-"""SCONE's files: what is read, and what is refused with its line."""
+"""Tests of SCONE's files: supported settings, and errors with their lines."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What reflexes feel; beside OpenSim in :mod:`tests.oracle.test_reflex_sources`."""
+"""Tests of the sensors of reflexes; :mod:`tests.oracle.test_reflex_sources` compares with OpenSim."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def test_what_has_no_meaning_is_refused(kind, changed, words) -> None:
 
 
 def test_a_gain_that_is_looked_for_is_felt_even_where_it_is_none() -> None:
-    """So that candidates differ in numbers only."""
+    """The sensors do not depend on values of parameters, so that candidates differ in numbers only."""
     model, given = arm(), {"dual_sided": 0, "BodyOrientationReflex": TURN}
     one, none = held(model, given), held(model, given, {"flexor-forearm.KP": 0.0})
     assert one.plan.tolist() == none.plan.tolist() and one.sensors == none.sensors == (
@@ -99,7 +99,7 @@ def test_sides(tmp_path) -> None:
 
 
 def test_kernels_as_python_feel_likewise(monkeypatch) -> None:
-    """Where a place outside an array is an error."""
+    """Vectors with bounds raise an error for indices outside."""
     from tests.simulation.checked import Checked
 
     given = {

@@ -1,4 +1,4 @@
-"""Humans that walk by reflexes: ours, and SCONE's where its sources are beside this repository."""
+"""Tests of humans that walk by reflexes: the built-in one, and SCONE's if its sources are next to this repository."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def test_our_human_walks(ours) -> None:
     far = walked.states["/jointset/ground_pelvis/pelvis_tx/value"]
     assert 1.0 < np.ptp(far) / 4.0 < 1.5
     loads = walked.loads.rows[200:]
-    # Each foot carries the body in turn, and both do for a while.
+    # Each foot alone carries the body in turn, and both do for some time.
     assert (loads.max(axis=0) > 0.9).all() and (loads.min(axis=0) == 0.0).all()
     assert 0.02 < np.mean((loads > 0.05).all(axis=1)) < 0.4
     assert walked.results[0] == pytest.approx(
@@ -62,7 +62,7 @@ def test_our_human_walks(ours) -> None:
 
 
 def test_candidates_are_single_walks_bit_for_bit(ours) -> None:
-    """Also when one beside falls."""
+    """This also holds when another candidate falls."""
     best = ours.best()
     name = "S00011.vasti.KF"
     gains = np.array([best[name], 0.0, 1.1 * best[name]])
@@ -140,7 +140,7 @@ def test_an_arm_holds_a_weight(arm, tmp_path) -> None:
     ):
         search_parameters(Scenario(arm), tmp_path / "out", generations=1, population=8, resume=True)
     (tmp_path / "out" / "best.par").write_text(text)
-    # The best so far is one of the candidates, and a mean beyond the bounds is none.
+    # The previous best is a candidate of the next generation; a mean beyond the bounds is moved into them.
     text = (tmp_path / "out" / "best.par").read_text().split("\n", 1)
     name, best, _, std = text[0].split()
     (tmp_path / "out" / "best.par").write_text(f"{name} {best} -5 {std}\n{text[1]}")
@@ -286,7 +286,7 @@ def test_implicit_steps_do_not_shrink_where_feet_touch(ours) -> None:
 
 
 def bumpy(model, height, seed):
-    """A model whose floor has bumps, some three a metre, of up to a height (m)."""
+    """Return the model with bumps on its floor, about three per metre and up to `height` (m) high."""
     model, rng = model.copy_deep(), np.random.default_rng(seed)
     tops = [
         (0.5 + 0.3 * k + rng.uniform(-0.1, 0.1), height * rng.uniform(0.3, 1.0)) for k in range(45)
@@ -324,7 +324,7 @@ def test_gaits_need_legs(arm) -> None:
 
 
 def test_scone_s_human_walks_twenty_seconds() -> None:
-    """By the parameters that are published with it."""
+    """The parameters are published with SCONE."""
     name = "scenarios/Examples3/Gait2D - H0918 - OpenSim4.scone"
     for parent in ROOT.parents:
         if (file := parent / "pub-scone" / name).is_file():
@@ -332,7 +332,7 @@ def test_scone_s_human_walks_twenty_seconds() -> None:
     else:
         pytest.skip("needs the sources of scone-core, which are not beside this repository")
     scenario, count, rng = Scenario(file), 16, np.random.default_rng(0)
-    # Contact makes of rounding another walk: some of these fall, on whatever processor.
+    # Contact amplifies rounding errors to different walks: some of these fall, on any processor.
     values = {
         name: best * (1.0 + 1e-7 * rng.normal(size=count)) for name, best in scenario.best().items()
     }
@@ -344,7 +344,7 @@ def test_scone_s_human_walks_twenty_seconds() -> None:
 
 
 def test_kernels_as_python_walk_likewise(ours, arm, monkeypatch) -> None:
-    """Where a place outside an array is an error."""
+    """Vectors with bounds raise an error for indices outside."""
     from tests.simulation.checked import Checked
 
     for file, seconds in ((ours.folder / "human-walks.scone", ours.step), (arm, 0.02)):

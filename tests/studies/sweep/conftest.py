@@ -1,4 +1,4 @@
-"""What the tests of sweeps need to run."""
+"""Requirements of the tests of sweeps."""
 
 from __future__ import annotations
 

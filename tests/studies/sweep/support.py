@@ -1,4 +1,4 @@
-"""Models, data and comparisons that several test modules of this package share."""
+"""Model for the tests of sweeps."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from tests.simulation.elements.muscle_rows import hung, muscle
 
 
 def pulled():
-    """A block that a muscle, which is taut, and a motor pull."""
+    """Return a model of a block that a muscle with a taut tendon and a motor pull."""
     model = hung(
         muscle("thelen_default", default_activation=0.3, default_fiber_length=0.064), [0.3, 0.3]
     )

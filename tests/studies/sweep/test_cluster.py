@@ -1,4 +1,4 @@
-"""A real Dask cluster on this machine: a scheduler and workers, each a process of its own, some of which are killed."""
+"""Tests of sweeps on a Dask cluster of processes on this machine, some of which are killed."""
 
 from __future__ import annotations
 
@@ -41,11 +41,11 @@ def ended(run):
     time.sleep(float(os.environ.get("SECONDS_A_RUN", "0")))
     return run.time
 """
-"""A measure that takes its time on the workers: a sweep is to be interrupted, however quick the machine."""
+"""Measure that takes time on the workers, so that a sweep can be interrupted on machines of any speed."""
 
 
 class Cluster:
-    """A scheduler and its workers."""
+    """Dask scheduler and its workers, each in a process."""
 
     def __init__(self, folder):
         self.folder, self.processes = folder, []
@@ -63,7 +63,7 @@ class Cluster:
             self.start(*WORKER)
 
     def told_address(self):
-        """What the scheduler's file says, None while it is not there or not yet written."""
+        """Return the address in the scheduler's file, or None while the file is incomplete."""
         try:
             return json.loads(self.file.read_text())["address"]
         except (FileNotFoundError, ValueError):
@@ -211,12 +211,12 @@ def test_functions_that_cannot_travel_are_told(cluster, walker, tmp_path):
     chosen = choose_samples(made.variables, "random", 10)
     with pytest.raises(OsimliteError, match="module:function"):
         sweep(made, chosen, tmp_path / "r.parquet", cluster=cluster.address)
-    # Threads of this process need to send nothing.
+    # Threads of this process need no serialization.
     assert sweep(made, chosen, tmp_path / "r.parquet").status == {"done": 10}
 
 
 def test_workers_that_cannot_do_the_task_are_told(cluster, walker, tmp_path, monkeypatch):
-    """A module that is on this machine's path only, and another version of osimlite."""
+    """Workers lack a module that is on the path of this machine only, or have another version of osimlite."""
     (tmp_path / "only_here.py").write_text("def one(run):\n    return 1.0\n")
     monkeypatch.syspath_prepend(str(tmp_path))
     one = importlib.import_module("only_here").one
@@ -255,12 +255,11 @@ def test_a_scheduler_that_goes_is_told_and_nothing_is_lost(
 
         import distributed
 
-        # Workers start slowly on a busy machine; only the wait for a scheduler that has gone is to
-        # be short.
+        # Workers start slowly on a busy machine; only the wait for a scheduler that has ended is short.
         with distributed.Client(lost.address, set_as_default=False) as client:
             client.wait_for_workers(1, timeout=120)
         monkeypatch.setattr("osimlite.base.pools.CLUSTER_TIMEOUT_S", 5)
-        # The scheduler is asked for its workers after every task, also right after it was killed.
+        # The number of workers is requested after every task, also right after the scheduler was killed.
         monkeypatch.setattr("osimlite.base.pools.WORKER_COUNT_AGE_S", 0.0)
         with pytest.raises(OsimliteError, match="does not answer any more; continue with --resume"):
             sweep(made, chosen, tmp_path / "r.parquet", cluster=lost.address, progress=end)

@@ -1,4 +1,4 @@
-"""Sweeps of models with constraints: what is set stays, the rest follows, and what cannot be is a row with a reason."""
+"""Tests of sweeps with constraints: varied values are kept, others follow, impossible samples fail with a reason."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Controls that are varied: each run is that of the same model under controls that were given to it."""
+"""Tests of variables that are controls: each run equals a simulation with these controls."""
 
 from __future__ import annotations
 
@@ -34,7 +34,17 @@ def ends(model, initial=None, **controls):
 
 
 def runs(model, vary, *rows, **choices):
-    """The ends of runs, of which only the numbers were made afresh."""
+    """Run samples of which only numbers differ from the compiled model.
+
+    Args:
+        model: the model.
+        vary: variables and their ranges.
+        rows: samples.
+        choices: options of the plan.
+
+    Returns:
+        Final values ENDS of each run.
+    """
     made = plan(model, vary, measures=ENDS, to=TO, accuracy=1e-7, **choices)
     runner = Runner(made)
     assert runner.variants.make_variant(rows[0]).simulation is None
@@ -80,7 +90,7 @@ def test_switches_may_pass_each_other():
 
 
 def test_what_drives_an_actuator_is_scaled_and_moved():
-    """What the model does itself, and what all runs are given, by the same factor."""
+    """The factor applies to the controls of the model and to those that all runs have."""
     table = (np.array(TIMES), np.array([0.0, 0.4, 0.1, 0.2]))
     vary = {"mu/control@scale": (0.0, 2.0), "mu/control": (-1.0, 1.0)}
     (result,) = runs(pulled(), vary, (1.5, 0.1), controls={"mu": table, "motor": 0.2})
@@ -160,7 +170,7 @@ def test_the_model_that_is_written_does_the_same(tmp_path):
     osimlite.write(variants.model, tmp_path / "best.osim")
     best = osimlite.read(tmp_path / "best.osim")
     assert ends(best) == pytest.approx(result, rel=1e-12)
-    # It can be varied again.
+    # The written model can be varied again.
     Variants(plan(best, vary, controls=given))
 
 
@@ -243,7 +253,7 @@ def test_what_cannot_be_is_said():
 
 @pytest.mark.parametrize("choice", [{"integrator": "bdf"}, {"wrapping": "geodesic"}])
 def test_what_is_chosen_for_a_simulation_is_of_each_run(choice):
-    """The muscle bends around an egg; its numbers are made afresh with the wrapping that is chosen."""
+    """The muscle wraps around an ellipsoid; its numbers are updated for the selected wrapping."""
     model = pulled()
     egg = WrapEllipsoid(name="egg", dimensions=(0.05, 0.08, 0.06), translation=(0.15, 0.05, 0.01))
     model.ground.wrap_object_set.objects.append(egg)

@@ -1,4 +1,4 @@
-"""Measures that are written as expressions, beside what a simulation makes of them."""
+"""Tests of measures that are expressions, against the trajectories of simulations."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_they_are_of_the_columns_of_a_simulation():
 
 @pytest.mark.parametrize("engine", ["compiled", "bullet"])
 def test_places_of_bodies_and_the_mass_center(walker, engine):
-    """Numbers of the model that are varied count."""
+    """The result depends on the variables that are properties of the model."""
     names = [
         "center_of_mass_X",
         "center_of_mass_Y/speed",
@@ -110,7 +110,7 @@ def test_arithmetic(text, value):
 
 
 def effort(run):
-    """What a function can look at."""
+    """Compute a measure from a run, and check which histories a run has."""
     assert len(run.times) == 6
     with pytest.raises(
         SettingError, match="a run has no 'mu/activatio'; did you mean 'mu/activation'"

@@ -1,4 +1,4 @@
-"""What is kept of a run."""
+"""Tests of measures of runs."""
 
 from __future__ import annotations
 
@@ -87,18 +87,18 @@ def test_steps_of_models_of_other_numbers(walker):
 
 
 def drop(run):
-    """How far the pelvis has come down, m."""
+    """Return the height by which the pelvis has come down (m)."""
     return run.start["Pelvis_ty"] - run.end["Pelvis_ty"]
 
 
 def deepest(run):
-    """Least height of the pelvis at the reported times, m."""
+    """Return the least height of the pelvis at the reported times (m)."""
     assert len(run.times) == len(run.history("Pelvis_ty")) == 11
     return run.history("Pelvis_ty").min()
 
 
 def everything(run):
-    """What else a run has."""
+    """Check further attributes of a run."""
     assert run.values == {"RHip_rz": run.start["RHip_rz"]}
     assert run.time == 1.0 and len(run.events) > 0 and run.largest_forces["RFootForce"] > 0.0
     assert run.start["RHip_rz/speed"] == 0.0 and len(run.start) == len(list(run.start)) == 16
@@ -107,14 +107,14 @@ def everything(run):
 
 
 def picky(run):
-    """Fails for some runs."""
+    """Raise an error for some runs."""
     if run.values["RHip_rz"] == 0.5:
         raise ValueError("not this one")
     return 2.0
 
 
 def forgetful(run):
-    """Returns nothing."""
+    """Return nothing."""
 
 
 def test_a_function_that_returns_nothing_fails(walker):
@@ -141,7 +141,7 @@ def test_functions_of_ones_own(walker, tmp_path, monkeypatch):
 
 
 def kept_times(run):
-    """Times that were kept, of a run that may have ended early."""
+    """Return the number of recorded times of a run that may have ended early."""
     height = run.history("Pelvis_ty")
     assert len(height) == len(run.times) and np.isfinite(height).all() and run.times[-1] <= run.time
     return len(run.times)

@@ -1,4 +1,4 @@
-"""Searches: what they find is what the model does, and they go on as if nothing had happened."""
+"""Tests of searches: the result is reproducible by the model, and interrupted searches continue exactly."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from osimlite.studies.sweep.plan import plan
 from osimlite.studies.sweep.run import SweepInterruption
 from osimlite.studies.sweep.search import METHODS, OutOfBudget, Search
 
-# Not loaded here: that takes seconds, in each process that collects this module.
+# Do not import it here: that takes seconds, in each process that collects this module.
 if find_spec("cma") is None:
     pytest.skip("needs cma (extra 'optimize')", allow_module_level=True)
 pq = pytest.importorskip("pyarrow.parquet", reason="needs pyarrow (extra 'sweep')")
@@ -110,7 +110,7 @@ def test_it_begins_where_another_search_has_ended(made, walker, tmp_path):
 
 
 def test_it_looks_around_from_where_the_model_is(made, tmp_path):
-    """The model as it is comes first, then points all over the ranges; what follows begins at the best of them."""
+    """The model itself comes first, then points of the complete ranges; the search continues from the best of them."""
     result = optimize(
         made, DISTANCE, tmp_path, method="sobol-cma", budget=40, popsize=8, sigma=1e-6, seed=3
     )
@@ -194,7 +194,7 @@ def test_every_run_that_is_allowed_is_made(made, tmp_path, method):
 
 
 def least_drop(run):
-    """How far the pelvis comes down, m, and a penalty for starting fast."""
+    """Return how far the pelvis comes down (m), plus a penalty for a high initial speed."""
     return run.start["Pelvis_ty"] - run.end["Pelvis_ty"] + run.values["Pelvis_tx/speed"]
 
 
@@ -209,7 +209,7 @@ def test_functions_are_made_small_and_names_large_or_small(made, tmp_path):
 
 
 def endless(run):
-    """No number that could be the best, but for one run in the middle."""
+    """Return NaN except for samples near the middle of the range."""
     return (
         float("nan")
         if abs(run.values["Pelvis_tx/speed"] - 1.0) > 0.5
@@ -218,7 +218,7 @@ def endless(run):
 
 
 def never(run):
-    """No number at all."""
+    """Return infinity for every run."""
     return float("inf")
 
 

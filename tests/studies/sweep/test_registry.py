@@ -1,4 +1,4 @@
-"""What sweeps are asked for by name, which whoever has it registers."""
+"""Tests of the registry of objects that sweeps use by name."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sweeps here: the same file from any number of workers, whatever interrupts it."""
+"""Tests of sweeps on this machine: the file is the same for any number of workers and after any interruption."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def test_settings_are_in_the_file(made, tmp_path):
 
 
 class Stopper:
-    """Interrupts, as the keyboard would, once enough is done. With one worker the first runs are then saved."""
+    """Progress function that interrupts once `after` runs are done; with one worker the first runs are saved then."""
 
     def __init__(self, after):
         self.after = after
@@ -216,7 +216,7 @@ def test_a_torn_message_at_the_end_is_cut_off(made, tmp_path):
 
 
 def _ends(content: bytes) -> list[int]:
-    """Where the records of a partial file end."""
+    """Return the offsets at which the records of a partial file end."""
     ends = [0]
     while ends[-1] < len(content):
         head = results.RECORD_HEAD.unpack_from(content, ends[-1])
@@ -226,7 +226,11 @@ def _ends(content: bytes) -> list[int]:
 
 @pytest.fixture(scope="module")
 def interrupted_three_times(tmp_path_factory):
-    """A plan and its samples, the whole results, and the partial file, with three batches."""
+    """Interrupt a sweep three times.
+
+    Returns:
+        Plan, samples, the complete file of results, and the partial file with several batches.
+    """
     made = plan(dynamic_walker(), {"RHip_rz": (0.3, 0.5)}, to=0.05)
     chosen, folder = (
         choose_samples(made.variables, "sobol", 40, 5),
@@ -383,7 +387,7 @@ def test_a_column_has_a_name_of_its_own(walker, tmp_path):
 
 
 def test_one_program_at_a_time_writes(made, tmp_path):
-    """Who goes on with a sweep that is still running would write rows twice."""
+    """Continuing a sweep that is still running would write rows twice."""
     path, chosen = tmp_path / "r.parquet", choose_samples(made.variables, "sobol", 40, 5)
     told = []
 
@@ -470,7 +474,7 @@ def test_a_command_that_is_ended_goes_on(signum, made, tmp_path: Path, walker):
     if signum == signal.SIGINT:
         assert process.returncode == 130 and "--resume" in said, said
     assert partial.exists() and not (tmp_path / "results.parquet").exists()
-    # What is left is many runs, which need not be made for the sake of this test.
+    # Many runs remain, but this test does not need them.
     made = plan(
         osimlite.read(tmp_path / "walker.osim"), {"RHip_rz": "0.3:0.7"}, to=3.0, accuracy=1e-5
     )
@@ -505,7 +509,7 @@ def schema_of(made, chosen):
 
 
 def test_memory_does_not_grow_with_the_number_of_runs(made, tmp_path):
-    """Of Python's own objects, after the first hundred runs."""
+    """The memory of Python objects is measured after the first hundred runs."""
     import tracemalloc
 
     chosen = choose_samples(made.variables, "lhs", 400, 5)

@@ -1,4 +1,4 @@
-"""Each run is the simulation of the model that has these numbers, bit for bit."""
+"""Tests of runs of a sweep: each equals, bit for bit, the simulation of the model with these numbers."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ STATES = [
 
 
 def simulated(model, initial, speeds, to=0.6):
-    """Final state by the ordinary way, in the order of STATES."""
+    """Return the final state of a simulation, in the order of STATES."""
     with Simulation(model, "compiled") as simulation:
         trajectory = simulation.run(to, initial=initial, initial_speeds=speeds)
     columns = list(trajectory.coordinates)
@@ -66,7 +66,15 @@ def simulated(model, initial, speeds, to=0.6):
 
 
 def changed(chosen, values):
-    """The walker with the numbers written into it by hand."""
+    """Write the values of variables into the walker without the code of sweeps.
+
+    Args:
+        chosen: names of the variables.
+        values: their values.
+
+    Returns:
+        Model, initial coordinates and initial speeds.
+    """
     model = dynamic_walker()
     initial, speeds = {}, {}
     at = model.tree().by_path
@@ -162,7 +170,7 @@ def test_of_forces_masses_and_gravity_only_the_numbers_are_made_afresh(chosen):
 
 
 def test_controls_are_those_that_a_run_is_given():
-    """Besides what the model does; only the numbers are made afresh, of other controllers too."""
+    """Controls add to those of the model; only numbers are updated, also those of other controllers."""
     model = dynamic_walker()
     model.add(
         *(CoordinateActuator(name=f"{side}_hip", coordinate=f"{side}Hip_rz") for side in "RL")
@@ -213,7 +221,7 @@ def test_parameters_of_a_function():
 
 
 def test_a_number_that_becomes_zero_changes_the_structure():
-    """A sphere whose centre moves to the origin of its body needs no shift any more."""
+    """A sphere whose centre moves to the origin of its body needs no offset any more."""
     name = "/jointset/RightThighToPelvis/Pelvis_offset/translation/2"
     made = plan(dynamic_walker(), {name: (0.0, 0.2)}, measures=tuple(STATES), to=0.3)
     block = Runner(made).run(np.array([[0.2], [0.0], [0.1]]))
@@ -266,7 +274,7 @@ def test_stops(walker):
 
 
 def chain(parameters):
-    """Pendulums on one another on a cart; their number is a parameter."""
+    """Return a chain of pendulums on a cart; the number of links is a parameter."""
     model = Model(name="chain")
     cart = model.add(Body(name="cart", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
     first = SliderJoint(name="rail", coordinates=[Coordinate(name="x", default_speed_value=1.0)])
@@ -377,7 +385,7 @@ def test_bullet_gives_the_same_rows(walker):
         for engine in ("compiled", "bullet")
     ]
     for name in measures:
-        # The largest force is that at the end of a step, and steps may differ.
+        # The largest force is taken at ends of steps, and steps may differ.
         close = 1e-3 if name == "largest_force" else 1e-5
         assert both[0].measures[name] == pytest.approx(both[1].measures[name], rel=close), name
     assert both[0].status == both[1].status == ["done", "done"]

@@ -1,4 +1,4 @@
-"""Samples: the same again, in any pieces, and spread as they should be."""
+"""Tests of samples: reproducible, independent of the division into blocks, and of the right distribution."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def test_seeds_differ_and_samples_fill_the_cube():
 
 def test_sobol_is_scipys_own():
     rows = Samples((variable("a"), variable("b")), "sobol", 64, 3).make_block(10, 54)
-    # This takes longer to import than all tests here, and collecting them needs none of it.
+    # This import takes longer than all tests here, and collecting them does not need it.
     from scipy.stats import qmc  # type: ignore[import-untyped]
 
     expected = qmc.Sobol(2, scramble=True, rng=np.random.default_rng(3)).random(64)[10:]

@@ -1,4 +1,4 @@
-"""Auxiliary states in sweeps: measured, carried by both engines, and the same after an interruption."""
+"""Tests of auxiliary states in sweeps: measures, both engines, and continued sweeps."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def interrupt(done, of):
 
 
 def all_of_them(run):
-    """Every state at the start, at the reports and at the end is there by its name."""
+    """Check that every state is available at the start, at the reports and at the end."""
     assert len(run.end) == len(list(run.end))
     for path in run.engine.state.paths:
         assert run.start[path] == 0.0 and run.history(path)[-1] == run.end[path]
@@ -63,7 +63,7 @@ def test_random_models_keep_their_states_through_an_interruption(seed, tmp_path_
             0.02, accuracy=1e-7, initial={coordinate.name: values[3, 0]}
         ).auxiliary
     for path in paths:
-        # Under constraints, a batch moves its start by a rounding.
+        # With constraints, a batch changes its initial state by rounding errors.
         assert table[path][3] == pytest.approx(alone[path][-1], rel=1e-9, abs=1e-12)
         assert theirs[path][0] == pytest.approx(alone[path][-1], rel=1e-6, abs=1e-9)
     sums = np.sum([table[path] for path in paths], axis=0)
@@ -72,7 +72,7 @@ def test_random_models_keep_their_states_through_an_interruption(seed, tmp_path_
 
 @pytest.mark.parametrize("engine", ["bullet", "compiled"])
 def test_runs_may_start_in_equilibrium(engine):
-    """Each from its own place, and with the numbers of its own muscle; where there is none, it is told."""
+    """Each run has its own equilibrium, by its initial state and muscle; a run without an equilibrium fails."""
     model = hung(muscle("thelen_default"), [0.3, 0.3])
     slack = "/forceset/mu/tendon_slack_length"
     made = plan(

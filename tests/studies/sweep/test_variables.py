@@ -1,4 +1,4 @@
-"""What names mean, how ranges are written, and what is said of those that mean nothing."""
+"""Tests of the names and ranges of variables, and of their error messages."""
 
 from __future__ import annotations
 

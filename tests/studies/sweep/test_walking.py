@@ -1,4 +1,4 @@
-"""Measures of walking, and walkers that are put on their feet."""
+"""Tests of measures of walking, and of walkers that are placed on their feet."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from osimlite.studies.sweep.optimize import Objective, optimize
 from osimlite.studies.sweep.plan import plan
 from osimlite.studies.sweep.runner import Runner
 
-# Not loaded here: that takes seconds, in each process that collects this module.
+# Do not import it here: that takes seconds, in each process that collects this module.
 if find_spec("cma") is None:
     pytest.skip("needs cma (extra 'optimize')", allow_module_level=True)
 VARY = {"RHip_rz": (-0.5, 0.5), "LHip_rz/speed": (-4.0, 4.0), "LKnee_rz": (-1.0, 0.0)}
@@ -33,7 +33,15 @@ def points(vary, count=60):
 
 
 def walks_of(made, rows):
-    """Starts of samples that are planted, and the walks from there, by the functions that do it."""
+    """Place samples on their feet and simulate their walks without the code of sweeps.
+
+    Args:
+        made: plan of the sweep.
+        rows: samples.
+
+    Returns:
+        Initial states, and walks.
+    """
     runner, starts, walks = Runner(made), [], []
     for row in rows:
         engine = runner.variants.make_variant(row.tolist()).engine
@@ -112,7 +120,7 @@ def test_the_best_model_starts_on_its_feet(walker, tmp_path):
 
 
 def test_feet_may_be_given(walker):
-    """With a knee in the part of a foot, a knee on the ground does not end the walk."""
+    """If the knee belongs to the foot, a knee on the ground does not end the walk."""
     rows = points(VARY, 8)
     result = {}
     for feet in (
