@@ -1,4 +1,4 @@
-"""Models, data and comparisons that several test modules of this package share."""
+"""Setups, data and comparisons for the tests of tools."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ SCALE = """<OpenSimDocument Version="40600"><ScaleTool name="sc"><mass>70</mass>
 
 
 def laid_out(folder: Path) -> Path:
-    """A model and a trial with every kind of setup; returns the folder of the trial."""
+    """Write a model and a trial with setups of all kinds, and return the folder of the trial."""
     osimlite.write(free_body(), folder / "model.osim")
     trial = folder / "trial"
     make_trial(trial, 1, 40)
@@ -73,7 +73,13 @@ def state(folder: Path) -> dict[str, bytes]:
 
 
 def unpacked(source: Path, to: Path, name: str) -> None:
-    """A file, out of its .gz if it has one."""
+    """Copy a file, and decompress it if it is compressed.
+
+    Args:
+        source: path of the file, without `.gz`.
+        to: folder of the copy.
+        name: name of the copy.
+    """
     packed = source.with_name(f"{source.name}.gz")
     (to / name).write_bytes(
         gzip.decompress(packed.read_bytes()) if packed.exists() else source.read_bytes()
@@ -81,7 +87,13 @@ def unpacked(source: Path, to: Path, name: str) -> None:
 
 
 def make_trial(folder: Path, seed: int, frames: int = 60) -> None:
-    """Markers of a moving body, and setups that fit the motion and find its forces."""
+    """Write markers of a moving body, and setups that fit the motion and compute its forces.
+
+    Args:
+        folder: new folder of the trial.
+        seed: phase of the motion.
+        frames: number of frames.
+    """
     folder.mkdir(parents=True)
     times = np.linspace(0.0, 1.0, frames)
     values = 0.3 * np.sin(3.0 * times[:, None] + np.arange(6.0) + seed)
@@ -124,9 +136,13 @@ SETUP = """<OpenSimDocument Version="40600">
 
 
 def tables(folder: Path, model: Model, analyses: str, *, check: bool = True) -> dict[str, StoTable]:
-    """Return the tables of analyses of a slow motion of a model.
+    """Return the tables of analyses of a slow motion of a model, by name.
 
-    Without `check`, also those of classes that OpenSim 4.6 lacks.
+    Args:
+        folder: folder of the files.
+        model: the model.
+        analyses: XML of the analyses.
+        check: refuse what OpenSim 4.6 refuses; without it, classes that OpenSim 4.6 lacks are accepted.
     """
     osimlite.write(model, folder / "model.osim")
     mechanism = osimlite.mechanism(model)

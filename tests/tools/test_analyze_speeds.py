@@ -1,4 +1,4 @@
-"""AnalyzeTool with a file of speeds: they and its other states count, at the times of the coordinates."""
+"""Tests of AnalyzeTool with a file of speeds, whose states count at the times of the coordinates."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SETUP = """<OpenSimDocument Version="40600"><AnalyzeTool name="it"><model_file>m
 
 
 def slide_and_turn() -> osimlite.Model:
-    """A body that slides and turns, with a muscle along the slide."""
+    """Return a body that slides and turns, with a muscle along the slide."""
     names = ("turn", "lift", "slide")
     joint = osimlite.PlanarJoint(
         name="joint", coordinates=[osimlite.Coordinate(name=name) for name in names]
@@ -44,7 +44,17 @@ def slide_and_turn() -> osimlite.Model:
 def analyze(
     folder: Path, columns: Sequence[str], rows: np.ndarray, times: np.ndarray = TIMES
 ) -> dict[str, StoTable]:
-    """Return the tables by the ends of their names."""
+    """Run an analysis with a file of speeds.
+
+    Args:
+        folder: folder of the files.
+        columns: columns of the file of speeds.
+        rows: its rows.
+        times: its times.
+
+    Returns:
+        Tables by the ends of their names.
+    """
     osimlite.write(slide_and_turn(), folder / "model.osim")
     values = 0.02 * np.sin(3.0 * TIMES[:, None] + np.arange(3.0))
     write_sto(
@@ -62,7 +72,7 @@ def make_rows(count: int) -> np.ndarray:
 
 @pytest.mark.parametrize("labels", [("slide_u", "turn_u"), ("/jointset/joint/{}/speed",) * 2])
 def test_speeds_are_those_of_the_file(tmp_path: Path, labels: tuple[str, str]) -> None:
-    """In any order, by new and old names; without a column it is the default one."""
+    """Columns may have any order and new or old names; a missing column means the default speed."""
     names = [label.format(name) for label, name in zip(labels, ("slide", "turn"), strict=True)]
     rows = make_rows(2)
     tables = analyze(tmp_path, names, rows)

@@ -1,4 +1,4 @@
-"""Damaged trials and setups: a clear error that names a file, or an answer; never a traceback, nothing half written.
+"""Tests of damaged trials and setups: results, or a clear error that names a file, but no traceback or partial file.
 
 ``OSIMLITE_DAMAGES=500 pytest tests/tools/test_damaged.py`` tries more of them.
 """
@@ -55,7 +55,7 @@ LOST = (
 
 
 def number(text: str, random: random.Random) -> str:
-    """One number becomes something else."""
+    """Replace one number by another word."""
     result = list(re.finditer(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e-?\d+)?(?![\w.])", text))
     if not result:
         return text
@@ -99,7 +99,7 @@ def cell_gone(text: str, random: random.Random) -> str:
 
 
 def columns_gone(text: str, random: random.Random) -> str:
-    """A marker or a coordinate that vanishes for a while."""
+    """Remove a marker or coordinate for some rows."""
     lines = text.splitlines()
     column, first = random.randrange(1, 12), random.randrange(len(lines))
     for index in range(first, min(len(lines), first + random.choice((1, 5, 1000)))):
@@ -120,13 +120,13 @@ def line_ends(text: str, random: random.Random) -> str:
 
 
 def every_second(text: str, random: random.Random) -> str:
-    """Frames of a lower rate, which the header does not say."""
+    """Leave out frames, so that the rate differs from that in the header."""
     lines = text.splitlines(keepends=True)
     return "".join(lines[:8] + lines[8 :: random.choice((2, 7, 30))])
 
 
 def name_lost(text: str, random: random.Random) -> str:
-    """A file, a marker or a body that is called otherwise."""
+    """Change the name of a file, a marker or a body."""
     result = list(re.finditer(r">([^<>\s][^<>\n]*)<", text))
     if not result:
         return text
@@ -152,7 +152,7 @@ DAMAGES: tuple[Callable[[str, random.Random], str], ...] = (
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
-    """All files of a trial that is as it should be."""
+    """Return all files of an undamaged trial."""
     folder = tmp_path_factory.mktemp("whole")
     laid_out(folder)
     return state(folder)

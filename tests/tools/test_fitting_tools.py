@@ -1,4 +1,4 @@
-"""Setups of inverse kinematics and scaling, run as OpenSim runs them: the same files, the same numbers."""
+"""Tests of setups of inverse kinematics and scaling against OpenSim's results: the same files, the same numbers."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ REFERENCE = "oracle/tools/reference"
 
 
 def test_inverse_kinematics_writes_opensims_files(shared: Path, tmp_path: Path) -> None:
-    """Headers, columns and digits; values near OpenSim's at its default accuracy, the errors no larger."""
+    """Headers, columns and digits are equal; values are near OpenSim's, and errors are no larger."""
     case = shared / REFERENCE / "ik_gait10"
     setup = osimlite.read_document(case / "walk_Setup_IK.xml")
     setup.model_file, setup.marker_file, setup.output_motion_file = (
@@ -42,7 +42,7 @@ def test_inverse_kinematics_writes_opensims_files(shared: Path, tmp_path: Path) 
 
 
 def test_scaling_writes_opensims_files(shared: Path, tmp_path: Path) -> None:
-    """Two models, the factors, and the pose of the subject."""
+    """Compare two models, the scale factors, and the pose of the subject."""
     case = shared / REFERENCE / "scale_gait2354"
     tool = osimlite.read_document(case / "scale.xml")
     names = {

@@ -1,4 +1,4 @@
-"""Motions that setups ask for: where they start, which steps they may take, what is written, what is refused."""
+"""Tests of forward setups: initial states, steps, results and errors."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ SETUP = """<OpenSimDocument Version="40600">
 
 @pytest.fixture
 def setup(fixtures: Path, tmp_path: Path) -> Path:
-    """A setup that goes on from a motion of the walker."""
+    """Write a setup that continues a motion of the walker."""
     (tmp_path / "model").mkdir()
     model = tmp_path / "model" / "walker.osim"
     model.write_bytes((fixtures / "walker" / "DynamicWalkerModel.osim").read_bytes())
@@ -50,14 +50,14 @@ def test_a_motion_goes_on_from_the_row_before(setup: Path) -> None:
     assert outcome.done and states.times[0] == pytest.approx(0.2) and states.times[-1] == 0.3
     before = read_sto(setup.parent / "states.sto")
     assert states.columns == before.columns and states.rows[0].tolist() == before.rows[2].tolist()
-    # Steps are others, but the motion is the same.
+    # The steps differ, but the motion is the same.
     assert states.rows[-1] == pytest.approx(before.rows[3], abs=1e-4)
     degrees = outcome.tables["fall_states_degrees.mot"]
     turning = [name for name in states.columns if "knee" in name.lower()]
     assert turning and all(
         np.allclose(np.radians(degrees[name]), states[name], rtol=1e-14) for name in turning
     )
-    # A model without actuators has a table of controls without rows, as OpenSim writes it.
+    # Without actuators, the table of controls has no rows, as in OpenSim.
     (empty,) = [path for path in outcome.files if path.name == "fall_controls.sto"]
     assert (
         empty.read_text()
@@ -118,7 +118,7 @@ def test_what_means_nothing_is_refused_and_nothing_is_written(
 
 
 def test_what_a_setup_adds_may_be_old(setup: Path, tmp_path: Path) -> None:
-    """Forces with words that mean nothing any more, and a controller that names all actuators by one word."""
+    """Old forces have obsolete properties, and a controller names all actuators by one word."""
     (tmp_path / "forces.xml").write_text(
         '<OpenSimDocument Version="20302"><ForceSet name="f"><objects><CoordinateActuator name="push">'
         "<coordinate>RKnee_rz</coordinate><optimal_force>2</optimal_force><max_force>3</max_force></CoordinateActuator>"
@@ -154,7 +154,7 @@ def test_labels_of_all_ages_are_states() -> None:
 
 
 def test_a_motion_with_muscles_and_controls_is_opensims(shared: Path, tmp_path: Path) -> None:
-    """arm26 with its ControlSet beside the setup: OpenSim's own files, to the last digit that it prints."""
+    """The model is arm26 with a ControlSet; the files equal OpenSim's to the last printed digit."""
     case = shared / "oracle" / "tools" / "reference" / "forward_arm26"
     for file in case.iterdir():
         content = gzip.decompress(file.read_bytes()) if file.suffix == ".gz" else file.read_bytes()

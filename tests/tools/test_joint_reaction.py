@@ -1,4 +1,4 @@
-"""What a joint carries that OpenSim does not know: one whose child carries its parent in the tree."""
+"""Tests of reactions of a reversed joint, which OpenSim does not have: its child carries its parent in the tree."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SETUP = """<OpenSimDocument Version="40600"><AnalyzeTool name="it">
 
 
 def reactions(folder: Path, model: Model, elbow: float, side: str) -> Any:
-    """What the elbow does to a body while it bends so much faster than the shoulder."""
+    """Return the reactions of the elbow on a body, for a motion whose elbow angle is scaled by `elbow`."""
     folder.mkdir()
     osimlite.write(model, folder / "model.osim")
     times = np.linspace(0.0, 1.0, 11)

@@ -1,4 +1,4 @@
-"""Pipelines of labs: what is said of them, and files in which others look for names."""
+"""Tests of pipelines of labs: messages about them, and files whose columns other programs read by name."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from tests.suite import choose
 
 
 def test_the_moments_without_equilibrium_are_named(tmp_path: Path) -> None:
-    """In words, in JSON, and in the header of each table with NaN."""
+    """Times without equilibrium are named in the output, in JSON, and in the header of each table with NaN."""
     folder = copy_lab("unbalanced", tmp_path)
     done = run("run", "ma.xml", "-o", "out", folder=folder)
     assert done.code == 0
@@ -77,7 +77,7 @@ def test_a_muscle_that_never_has_an_equilibrium(tmp_path: Path) -> None:
 )
 @pytest.mark.parametrize("start", ["0.2", "0.25", "0"])
 def test_given_forces_are_not_doubted(tmp_path: Path, probe: str, start: str) -> None:
-    """Probes of muscles, and forces that cover the analysis but not the time from 0 on, are no reason to warn."""
+    """Probes of muscles cause no warning, nor do forces that cover the analysis but not the time from 0 on."""
     folder = copy_lab("probe", tmp_path)
     text = (folder / "leg.osim").read_text()
     assert "Umberger2010MuscleMetabolicsProbe" in text
@@ -103,7 +103,7 @@ def test_given_forces_that_end_early_are_told(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["lim", "pelvis_limit", "PotentialEnergy"])
 def test_energy_of_limits_has_one_label(tmp_path: Path, name: str) -> None:
-    """StaticOptimization calls it as ForceReporter and OpenSim do, whatever the force is called."""
+    """StaticOptimization uses the label of ForceReporter and OpenSim, for any name of the force."""
     folder = copy_lab("energy", tmp_path)
     change(folder / "leg.osim", ('name="lim"', f'name="{name}"'))
     forces = osimlite.run(folder / "so.xml", folder / "out").tables[
@@ -119,7 +119,7 @@ def test_energy_of_limits_has_one_label(tmp_path: Path, name: str) -> None:
 
 @pytest.mark.parametrize("setup", ["cmc.xml", "cmc_slow.xml"])
 def test_a_lock_is_named(tmp_path: Path, setup: str) -> None:
-    """A task of a locked coordinate ends no motion, and what is said names the lock."""
+    """A task of a locked coordinate does not end the motion, and a message names the lock."""
     folder = copy_lab("locked", tmp_path)
     result = osimlite.run(folder / setup, folder / "out")
     assert result.done
@@ -149,7 +149,7 @@ def test_a_window_of_no_length_is_refused(tmp_path: Path) -> None:
 
 
 def test_files_beside_a_setup_are_named_as_the_setup_is(tmp_path: Path) -> None:
-    """Without ./ before them, which the name of the setup does not have either."""
+    """Messages name files near the setup without `./`, as the setup is named."""
     folder = copy_lab("ground", tmp_path)
     change(folder / "loads.xml", ("ground_force_v", "ground_forc_v"))
     done = run("run", "id.xml", "-o", "out", folder=folder)
@@ -168,10 +168,10 @@ def test_an_unknown_force_to_exclude_does_not_end_a_run(tmp_path: Path) -> None:
 
 
 def test_computed_controls_do_not_depend_on_rounding(tmp_path: Path) -> None:
-    """A tendon that is longer by an atom's width changes the forces of no muscle.
+    """Adding the width of an atom to the length of a tendon changes no muscle force.
 
-    Fibers of a short muscle at a small activation are stiff. With the accuracy of OpenSim's
-    prediction they do not converge: the first forces change by 0.8 N, those after 0.1 s by 85 N.
+    Fibers of a short muscle at a small activation are stiff. With the accuracy of OpenSim's prediction they do not
+    converge: the first forces change by 0.8 N, those after 0.1 s by 85 N.
     """
     tables = []
     for number in range(choose(2, 3)):
@@ -261,7 +261,7 @@ def test_what_opensim_reads_as_a_default_is_run(tmp_path: Path, what: str) -> No
 
 @pytest.mark.parametrize("tag", ["initial_time", "output_precision"])
 def test_what_opensim_refuses_is_refused(tmp_path: Path, tag: str) -> None:
-    """Empty numbers of setups of older classes have no default."""
+    """Empty numbers in setups of older classes have no default."""
     folder = copy_lab("energy", tmp_path)
     text = (folder / "so.xml").read_text()
     text = text.replace("<initial_time>0</initial_time>", "") if tag == "initial_time" else text
@@ -293,7 +293,7 @@ def test_an_empty_switch_of_an_older_class_is_off(tmp_path: Path) -> None:
 
 
 def test_inverse_dynamics_of_columns_by_paths(tmp_path: Path) -> None:
-    """It computes the motion, and says that OpenSim would not."""
+    """The motion is computed, with a warning that OpenSim would not compute it."""
     folder = copy_lab("paths", tmp_path)
     done = run("run", "id.xml", "-o", "out", folder=folder)
     assert done.code == 0
@@ -322,7 +322,7 @@ CHAINED = """<OpenSimDocument Version="40600"><InverseDynamicsTool name="id"><re
 def test_results_put_elsewhere_are_found(
     tmp_path: Path, stale: bool, folder_name: str, workers: str
 ) -> None:
-    """A setup reads what another has made into the folder of -o, also where an old file is in the usual place."""
+    """A setup reads the result of another one from the folder of -o, even if an old file is in the usual folder."""
     folder = copy_lab("unseen", tmp_path)
     change(
         folder / "ik.xml",
@@ -346,7 +346,7 @@ def test_results_put_elsewhere_are_found(
 def test_tables_that_a_tool_calls_by_its_name_are_found(
     tmp_path: Path, order: tuple[str, str], where: str
 ) -> None:
-    """The forces that static optimization writes have no property with their name."""
+    """The force file of static optimization has no property for its name; its name follows from that of the tool."""
     folder = copy_lab("probe", tmp_path)
     done = run("run", *order, *(("-o", where) if where else ()), folder=folder)
     assert done.code == 0, done.out + done.err
@@ -359,7 +359,7 @@ def test_tables_that_a_tool_calls_by_its_name_are_found(
 
 
 def test_a_table_that_no_tool_of_the_run_writes_waits_for_none(tmp_path: Path) -> None:
-    """A name that only begins like that of a tool is no result of it."""
+    """A file whose name only begins like that of a tool is not a result of this tool."""
     folder = copy_lab("unseen", tmp_path)
     osimlite.run(folder / "ik.xml")
     (folder / "ik_measured.mot").write_bytes((folder / "ik.mot").read_bytes())
@@ -375,7 +375,7 @@ def test_a_table_that_no_tool_of_the_run_writes_waits_for_none(tmp_path: Path) -
 def test_paths_without_a_quantity_are_told_as_opensim_reads_them(
     tmp_path: Path, setup: str
 ) -> None:
-    """Analyses of OpenSim know names, and paths of values; with other paths every coordinate is 0."""
+    """OpenSim's analyses accept names and paths of values; with other paths every coordinate is 0."""
     folder = copy_lab("loop", tmp_path)
     change(folder / "walk.mot", ("time\tja_q\tjb_q", "time\t/jointset/ja/ja_q\t/jointset/jb/jb_q"))
     result = osimlite.run(folder / setup)

@@ -1,4 +1,4 @@
-"""Many setups in one command: their order, workers, what fails, what is interrupted and goes on."""
+"""Tests of many setups in one command: order, workers, failures, interruption and resumption."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from tests.tools.support import make_trial
 
 @pytest.fixture
 def trials(tmp_path: Path) -> Path:
-    """Three trials of a model."""
+    """Write a model and three trials, and return the folder."""
     osimlite.write(free_body(), tmp_path / "model.osim")
     for seed in range(3):
         make_trial(tmp_path / f"trial{seed}", seed)
@@ -32,7 +32,7 @@ def trials(tmp_path: Path) -> Path:
 
 
 def results(folder: Path) -> dict[str, bytes]:
-    """All results in a folder."""
+    """Return the contents of all result files in a folder, by path."""
     files = [path for path in sorted(folder.rglob("*")) if path.suffix in (".mot", ".sto")]
     return {str(path.relative_to(folder)): path.read_bytes() for path in files}
 
@@ -69,7 +69,7 @@ def test_a_failure_stops_only_what_needs_it_and_is_mended_by_resuming(trials: Pa
     assert "needs results of trial1/z_ik.xml, which failed" in " ".join(done.out.split())
     assert (trials / JOURNAL).exists()
     file.write_text(whole)
-    # What is done is not done again, unless its inputs or its results are others.
+    # With --resume, setups run again only if their inputs or results have changed.
     times = {name: (trials / name).stat().st_mtime_ns for name in results(trials)}
     (trials / "trial0" / "id.sto").unlink()
     done = run("run", "trial*/*.xml", "--resume", folder=trials)
@@ -79,7 +79,7 @@ def test_a_failure_stops_only_what_needs_it_and_is_mended_by_resuming(trials: Pa
 
 
 def test_warnings_of_each_are_told_in_the_table(trials: Path) -> None:
-    """A misspelt marker, and units that cannot be right."""
+    """The trials have a misspelt marker, and units that cannot be right."""
     one, two = trials / "trial0" / "trial.trc", trials / "trial1" / "trial.trc"
     one.write_text(one.read_text().replace("three", "thre"))
     setup = trials / "trial0" / "z_ik.xml"
@@ -101,7 +101,7 @@ def test_warnings_of_each_are_told_in_the_table(trials: Path) -> None:
 
 
 def test_what_another_program_made_is_taken(trials: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A setup that cannot be run here keeps none waiting for what it made elsewhere."""
+    """A setup that cannot run here does not block others, because its results exist already."""
     monkeypatch.chdir(trials)
     monkeypatch.setattr(
         "osimlite.tools.many.list_runnable",
@@ -224,7 +224,7 @@ def test_what_is_there_is_whole_and_resuming_ends_with_the_same_bytes(
         done = run("run", "trial*/*.xml", "--resume", folder=trials)
         assert done.code == 0
     assert results(trials) == whole
-    # What is killed leaves what it was writing beside its place.
+    # A killed process leaves temporary files next to its results.
     assert how != "keyboard" or not list(trials.rglob(".osimlite-*"))
 
 

@@ -1,4 +1,4 @@
-"""Quantities of fibers and tendons: those that change are derivatives of those that are lengths and angles."""
+"""Tests of quantities of fibers and tendons: velocities are derivatives of lengths and angles."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ STEP = 1e-6
 
 
 def records(t: float) -> dict[str, Any]:
-    """What the law of a muscle of constant width records at a time, with forces that are any numbers."""
+    """Return the record of a muscle of constant width at a time, with arbitrary forces."""
     width = 0.02
     along, along_rate = 0.08 + 0.01 * np.sin(3.0 * t), 0.03 * np.cos(3.0 * t)
     fiber = np.hypot(width, along)
@@ -50,7 +50,7 @@ def test_rates_and_powers_follow_from_lengths_and_forces() -> None:
             "FiberVelocity": fiber,
             "NormFiberVelocity": fiber / (0.09 * 12.0),
             "PennationAngularVelocity": turning,
-            # What the spring of the fibers takes, and all other forces of them.
+            # The passive power is that of the parallel spring, and the active power that of all other fiber forces.
             "FiberPassivePower": -70.0 * fiber,
             "FiberActivePower": -(180.0 + 90.0 - 70.0) * fiber,
             "TendonPower": -250.0 * tendon,

@@ -1,4 +1,4 @@
-"""Files that setups name through each other."""
+"""Tests of the files that setups name, directly or through other files."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ def test_what_a_named_document_names_is_named_too(tmp_path: Path) -> None:
     osimlite.write(osimlite.ExternalLoads(name="loads", datafile="plates.mot"), tmp_path / "l.xml")
     setup = write_setup(tmp_path, "id.xml", "l.xml")
     assert sorted(names(setup)) == ["l.xml", "model.osim", "motion.mot", "plates.mot"]
-    # Once more, from the cache.
+    # The second call uses the cache.
     assert sorted(names(setup)) == ["l.xml", "model.osim", "motion.mot", "plates.mot"]
-    # Where results go depends on the tool: beside the setup, or in its folder of results.
+    # Depending on the tool, results are next to the setup or in its folder of results.
     results = [*find_named_files(setup, "output-file")]
     assert results[:2] == [str(tmp_path / "forces.sto"), str(tmp_path / "results" / "forces.sto")]
     assert all(

@@ -1,4 +1,4 @@
-"""The tables of tools and analyses name functions that exist, for classes that OpenSim has."""
+"""Tests of the tables of tools and analyses: their functions exist, and their classes are OpenSim's."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Analyses that report what a model has: states, actuators, probes, muscles."""
+"""Tests of analyses that report states, actuators, probes and muscles."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def test_muscles_of_several_classes_stand_in_their_order(tmp_path: Path) -> None
 @pytest.mark.parametrize(
     ("cls", "more"),
     [
-        # OpenSim writes no numbers for most of its tables.
+        # For this muscle, OpenSim writes no numbers in most of the tables.
         (Delp1990Muscle_Deprecated, {}),
         (RigidTendonMuscle, {"appliesForce": False}),
     ],

@@ -1,4 +1,4 @@
-"""Zeros of functions that do not depend on one another."""
+"""Tests of finding roots of several independent functions at once."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def test_each_function_has_its_zero() -> None:
 
     found = find_roots(function, np.zeros(4), np.ones(4), 1e-10)
     assert found == pytest.approx(wanted, abs=1e-10)
-    # Lines are met exactly, however loose the tolerance.
+    # Roots of linear functions are exact at any tolerance.
     assert find_roots(function, np.zeros(4), np.ones(4), 4e-3)[0] == pytest.approx(0.3, abs=1e-15)
     assert find_roots(function, np.zeros(4), np.ones(4), 4e-3) == pytest.approx(wanted, abs=4e-3)
 

@@ -1,4 +1,4 @@
-"""Running setups of tools: what is refused, where files are looked for, and where results go."""
+"""Tests of running setups of tools: errors, search for files, and folders of results."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ SETUP = """<?xml version="1.0" encoding="UTF-8" ?>
 
 @pytest.fixture
 def setup(fixtures: Path, tmp_path: Path) -> Path:
-    """The setup of a tool that can be run, with its model and its motion."""
+    """Write the setup of a tool that can be run, with its model and its motion."""
     (tmp_path / "walker.osim").write_bytes(
         (fixtures / "walker" / "DynamicWalkerModel.osim").read_bytes()
     )
@@ -70,7 +70,7 @@ def test_what_is_written_and_what_is_returned(setup: Path) -> None:
 
 
 def test_a_file_of_the_current_folder_is_told(setup: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A trial without data must not take those of another one without a word."""
+    """A trial without data must not silently use the data of another trial."""
     trial = setup.parent / "trial"
     trial.mkdir()
     for name in ("setup.xml", "walker.osim"):
@@ -85,7 +85,7 @@ def test_a_file_of_the_current_folder_is_told(setup: Path, monkeypatch: pytest.M
 
 
 def test_the_setup_that_makes_what_is_missing_is_told(setup: Path) -> None:
-    """Whoever runs inverse dynamics first forgot inverse kinematics."""
+    """The message names the setup that creates the missing file: inverse kinematics before inverse dynamics."""
     (setup.parent / "walk.mot").unlink()
     fit = osimlite.InverseKinematicsTool(
         name="ik", model_file="walker.osim", output_motion_file="walk.mot"
@@ -143,7 +143,7 @@ def test_what_a_setup_names_is_checked_too(setup: Path) -> None:
 
 
 def test_only_files_are_run(setup: Path) -> None:
-    """Neither a list, nor an object, nor a folder, for which the command shows how to write its setups."""
+    """A list, an object or a folder is refused; for a folder, the message shows how to name its setups."""
     for wrong in ([setup], osimlite.read_document(setup)):
         with pytest.raises(
             OsimliteError,
@@ -231,7 +231,7 @@ def test_the_check_reads_each_document_once(
     reports = list(running._check_documents(str(setup), {}))
     assert len(reports) == 3
     assert sorted(files) == ["loads.xml", "setup.xml", "walker.osim"]
-    # What reads the document next gets a copy, which it may change.
+    # Each reader of a cached document gets a copy, which it may change.
     first, second = (cache.read_object(loads, osimlite.ExternalLoads) for _ in range(2))
     assert first == second
     assert first is not second
@@ -239,6 +239,6 @@ def test_the_check_reads_each_document_once(
 
 
 def read_counted(files: list[str], read: Any, source: Any, **options: Any) -> Any:
-    """Note the name of a file, and read it."""
+    """Append the name of a file to `files`, and read it."""
     files.append(Path(source.file).name)
     return read(source, **options)

@@ -1,4 +1,4 @@
-"""StaticOptimization: the exact solutions of the reference data, OpenSim's forces, and what has no solution."""
+"""Tests of StaticOptimization: exact solutions of the reference data, OpenSim's forces, and unsolvable problems."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ ACTIVATION, FORCE = "walk_StaticOptimization_activation.sto", "walk_StaticOptimi
 
 @pytest.fixture(scope="module")
 def reference(shared: Path) -> Path:
-    """Setups, results of OpenSim, and exact solutions of the same quadratic problems."""
+    """Return the folder with setups, OpenSim's results, and exact solutions of the same quadratic problems."""
     return shared / "oracle" / "tools" / "reference"
 
 
 @pytest.fixture
 def walk(reference: Path, tmp_path: Path) -> Path:
-    """The setup of a model with eighteen muscles, three residuals and seven reserves."""
+    """Write the setup of a model with eighteen muscles, three residuals and seven reserves."""
     for name, source in {
         "subject01.osim": "models/gait10_subject01.osim.gz",
         "ExperimentalData/subject01_walk_grf.xml": "id_gait10/subject01_walk_grf.xml",
@@ -41,7 +41,15 @@ def walk(reference: Path, tmp_path: Path) -> Path:
 
 
 def written(file: Path, tmp_path: Path) -> tuple[StoTable, list[str]]:
-    """A table of OpenSim's, and its lines up to the numbers."""
+    """Read a compressed table of OpenSim.
+
+    Args:
+        file: the table.
+        tmp_path: folder for the decompressed file.
+
+    Returns:
+        Table, and the lines before the numbers.
+    """
     plain = tmp_path / file.name.removesuffix(".gz")
     plain.write_bytes(gzip.decompress(file.read_bytes()))
     table, lines = read_sto(plain), plain.read_text().splitlines()
@@ -58,7 +66,7 @@ def test_a_walk_is_solved_exactly(walk: Path, reference: Path, tmp_path: Path) -
     assert x[:, :18] == pytest.approx(exact["x"][:, :18], abs=1e-6)
     assert (exact["lo"] <= x).all()
     assert (x <= exact["hi"]).all()
-    # What OpenSim's matrices say of accelerations of up to 9000 /s².
+    # The equations are those of OpenSim's matrices, for accelerations of up to 9000 /s².
     assert np.einsum("tmn,tn->tm", exact["A"], x) == pytest.approx(exact["b"], abs=1e-9)
     theirs, head = written(reference / "so_gait10" / "activation.sto.gz", tmp_path)
     assert (np.sum(x**2, axis=1) <= np.sum(theirs.rows**2, axis=1)).all()
@@ -66,7 +74,7 @@ def test_a_walk_is_solved_exactly(walk: Path, reference: Path, tmp_path: Path) -
     forces, head = written(reference / "so_gait10" / "force.sto.gz", tmp_path)
     ours = result.tables[FORCE]
     assert (walk.parent / "Results" / FORCE).read_text().splitlines()[: len(head)] == head
-    # Each force for the activation that OpenSim found.
+    # Forces are proportional to activations, so they can be compared at OpenSim's activations.
     assert ours.rows[:, :18] / x[:, :18] * theirs.rows[:, :18] == pytest.approx(
         forces.rows[:, :18], abs=1e-8
     )

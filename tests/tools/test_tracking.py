@@ -1,4 +1,4 @@
-"""Setups of RRA and CMC without OpenSim: what follows what, and what is refused."""
+"""Tests of setups of RRA and CMC without OpenSim: tracking, results and errors."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ TASKS = """<OpenSimDocument Version="40600">
 
 
 def pendulum(strength: float = 100.0, **bounds: float) -> osimlite.Model:
-    """A rod on a motor."""
+    """Return a rod on a pin joint with a motor."""
     model = osimlite.Model(name="pendulum")
     rod = osimlite.Body(
         name="rod", mass=1.0, mass_center=(0.0, -0.5, 0.0), inertia=(0.1, 0.01, 0.1, 0.0, 0.0, 0.0)
@@ -53,7 +53,7 @@ def pendulum(strength: float = 100.0, **bounds: float) -> osimlite.Model:
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A setup of RRA for a pendulum that is to swing."""
+    """Write a setup of RRA for a swinging pendulum, and return the folder."""
     return written(tmp_path)
 
 
@@ -67,7 +67,7 @@ def written(
     final: float = 0.2,
 ) -> Path:
     model = pendulum() if model is None else model
-    # RRA has no forces but those that its setup names.
+    # In RRA, only the forces in files of the setup act.
     motor = osimlite.to_text(
         osimlite.schema.forces.ForceSet(objects=[model.force_set.objects[0].copy_deep()])
     )
@@ -91,7 +91,7 @@ def test_a_pendulum_follows(folder: Path, tool: str) -> None:
     assert states.times[-1] == pytest.approx(0.199 if tool == "RRATool" else 0.19, abs=1e-9)
     wanted = 0.2 * np.sin(4.0 * states.times)
     assert states["/jointset/pin/angle/value"] == pytest.approx(wanted, abs=2e-4)
-    # What the motor does is what moves it.
+    # The motion results from the forces of the motor.
     force = outcome.tables["it_Actuation_force.sto"]["motor"]
     assert outcome.tables["it_controls.sto"]["motor"] * 100.0 == pytest.approx(force, rel=1e-12)
     read = osimlite.read_document(folder / "results" / "it_controls.xml")
@@ -106,7 +106,7 @@ def test_a_pendulum_follows(folder: Path, tool: str) -> None:
 
 
 def test_who_is_too_weak_is_told(folder: Path) -> None:
-    """RRA does what it can; CMC, which must meet the accelerations, ends."""
+    """RRA continues with the largest controls; CMC, which must reach the accelerations, ends."""
     bounds = {"min_control": -0.001, "max_control": 0.001}
     written(folder, pendulum(1.0, **bounds))
     outcome = osimlite.run(folder / "setup.xml")
@@ -179,7 +179,7 @@ def test_a_property_that_opensim_ignores_stops_no_run(folder: Path) -> None:
 
 @pytest.mark.parametrize("tool", ["RRATool", "CMCTool"])
 def test_a_coordinate_may_have_no_actuator(tmp_path: Path, tool: str) -> None:
-    """Only the tasks are to be followed; another rod may swing freely below."""
+    """Only coordinates with tasks are tracked; another rod swings freely below."""
     model = pendulum()
     rod = next(body for body in model.components(osimlite.Body) if body.name == "rod")
     other = osimlite.Body(

@@ -1,4 +1,4 @@
-"""Results are written all or not at all, and never over what they come from."""
+"""Tests of writing results: completely or not at all, and never over the inputs."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tests.tools.support import laid_out, state
 
 @pytest.fixture
 def trial(tmp_path: Path) -> Path:
-    """The folder of a trial with setups of several tools; its model is in the folder above."""
+    """Return the folder of a trial with setups of several tools; its model is in the parent folder."""
     return laid_out(tmp_path)
 
 
@@ -57,7 +57,7 @@ def test_no_result_replaces_an_input(trial: Path, setup: str, result: str, into:
 
 
 def test_a_model_may_take_its_own_place(trial: Path) -> None:
-    """As the public setup of Rajagopal2016 places its markers."""
+    """The public setup of Rajagopal2016 places its markers in this way."""
     change(trial / "scale.xml", ">placed.osim<", ">../model.osim<")
     before = (trial.parent / "model.osim").read_bytes()
     osimlite.run(trial / "scale.xml")
@@ -124,7 +124,7 @@ def test_names_that_are_too_long_are_told(trial: Path, place: str) -> None:
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_nothing_is_computed_from_what_an_earlier_run_has_left(trial: Path, workers: int) -> None:
-    """With -o the motion goes elsewhere, and the forces are computed from it, not from the old one."""
+    """With -o, the motion goes to another folder, and the forces are computed from it, not from an old motion."""
     done = run(
         "run", "id.xml", "z_ik.xml", "-o", "new", "--workers", workers, "--json", folder=trial
     )
@@ -137,7 +137,7 @@ def test_nothing_is_computed_from_what_an_earlier_run_has_left(trial: Path, work
     ("precision", "time"), [(-3, "       0"), (0, "       0"), (12, "      0.200000000000")]
 )
 def test_digits_behind_the_point(trial: Path, precision: int, time: str) -> None:
-    """As OpenSim 4.6 prints them."""
+    """The numbers of digits are those of OpenSim 4.6."""
     change(
         trial / "forward.xml",
         "<initial_time>",
@@ -159,7 +159,7 @@ def test_more_digits_than_there_are(trial: Path) -> None:
 
 
 def test_markers_without_weights_are_not_told_to_be_unseen(trial: Path) -> None:
-    """The weight of a task of OpenSim's is 0 unless it is given."""
+    """In OpenSim, the weight of a task is 0 unless it is set."""
     told = osimlite.run(trial / "scale.xml").messages
     words = (
         "1 frame without any measurement that has a weight: the pose of the frame before is kept"

@@ -1,4 +1,4 @@
-"""Finished trials: OpenSim's own of gait2354, and copies of it with one fault each, of which each is found."""
+"""Tests of `check_trial`: OpenSim's trial of gait2354, and copies with one fault each, which must be found."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ IK, ID, LOADS = (
     "subject01_walk1_grf.xml",
 )
 TRUE_OF_IT = {"OSIM902"}
-"""What is really wrong with OpenSim's own trial: markers of shoulders whose arms the model has not are 8 cm off."""
+"""Real fault of OpenSim's trial: markers of the shoulders are off by 8 cm, because the model has no arms."""
 
 
 @pytest.fixture(scope="module")
 def gait(shared: Path, tmp_path_factory) -> Path:
-    """The trial as OpenSim has left it: a motion, and its inverse dynamics."""
+    """Write the trial with OpenSim's motion and inverse dynamics, and return the folder."""
     folder = tmp_path_factory.mktemp("gait")
     case = shared / REFERENCE / "ik_id_gait2354"
     for file in case.iterdir():
@@ -68,7 +68,7 @@ def number(report, name: str, kind: str = "") -> Any:
 def test_a_trial_of_opensims_has_no_false_alarm(gait: Path) -> None:
     report = osimlite.check_trial(gait)
     assert warned(report) == TRUE_OF_IT
-    # docs/whole-subject.md has the same errors, told by inverse kinematics itself.
+    # docs/whole-subject.md lists the same errors, as inverse kinematics reports them.
     assert number(report, "marker-error", "root").value == pytest.approx(2.19, abs=0.06)
     assert "R.Acromium" in number(report, "marker-error", "peak").where
     assert number(report, "swapped-markers").value == 0.0
@@ -78,7 +78,7 @@ def test_a_trial_of_opensims_has_no_false_alarm(gait: Path) -> None:
     peak = number(report, "residual-force", "peak of pelvis_ty")
     table = read_sto(gait / "inverse_dynamics.sto")
     assert peak.value == pytest.approx(np.abs(table["pelvis_ty_force"]).max())
-    # 5 % of the largest external force, and OpenSim's 10 N.
+    # The limits are 5 % of the largest external force, and OpenSim's 10 N.
     assert (peak.good, peak.verdict) == (10.0, "bad") and 40.0 < peak.bad < 50.0
     assert any("ScaleTool" in why for why in report.unchecked)
 
@@ -93,7 +93,7 @@ def test_a_finding_is_at_the_row_it_is_about(gait: Path) -> None:
 
 
 def exchange(trial: Path, one: str, other: str, first: float = 0.0, last: float = 9.0) -> None:
-    """Exchange two markers in the data between two times, and fit the motion anew."""
+    """Exchange two markers in the data between two times, and fit the motion again."""
     file = trial / "subject01_walk1.trc"
     lines = file.read_text().splitlines()
     places = [lines[3].split("\t").index(name) for name in (one, other)]
@@ -168,7 +168,7 @@ def test_what_is_missing_is_told_and_not_checked(trial: Path) -> None:
 
 
 def tables(folder: Path) -> None:
-    """Results of RRA without a setup: a peak of 30 N, one of 60 N m, and an error of 6 cm."""
+    """Write results of RRA without a setup: peaks of 30 N and 60 N m, and an error of 6 cm."""
     times = np.linspace(0.0, 1.0, 51)
     bump = np.exp(-(((times - 0.5) / 0.05) ** 2))
     forces = np.column_stack([30.0 * bump, 2.0 * bump, 60.0 * bump])
@@ -189,7 +189,7 @@ def test_results_without_a_setup_are_judged_by_what_they_say(tmp_path: Path) -> 
     }
     assert shown["the peak of FX of 'walk_Actuation_force.sto'"] == ("bad", pytest.approx(30.0))
     assert shown["the peak of FY of 'walk_Actuation_force.sto'"] == ("good", pytest.approx(2.0))
-    # Without loads Hicks' limit is not known, and OpenSim's is 75 N m.
+    # Without loads, the limit of Hicks et al. (2015) is unknown, and OpenSim's limit is 75 N m.
     assert shown["the peak of MZ of 'walk_Actuation_force.sto'"] == ("okay", pytest.approx(60.0))
     assert shown["the peak of the error of 'pelvis_tx'"] == ("bad", pytest.approx(6.0))
     assert shown["the peak of the error of 'knee_angle_r'"] == ("good", pytest.approx(1.0))

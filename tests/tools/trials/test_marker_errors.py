@@ -1,4 +1,4 @@
-"""Marker errors that `run`, its table and `check-trial` report of one motion: where they agree, and how they differ."""
+"""Tests of marker errors of one motion in `run`, its table and `check-trial`: where they agree and differ."""
 
 from __future__ import annotations
 
@@ -20,8 +20,9 @@ ONE_TASK = '<IKMarkerTask name="{}"><apply>true</apply><weight>1</weight></IKMar
 def compare_errors(folder: Path) -> tuple[np.ndarray, list[tuple[float, float]]]:
     """Run the inverse kinematics of a lab, and check the trial.
 
-    Returns: The markers' errors (t, m) in cm; and root mean square and largest error in cm, of the
-        summary of the run, of the table that it writes, and of the check of the trial.
+    Returns:
+        Marker errors (t, m) in cm; root mean square and largest error in cm of the summary of the run, of the
+        table that it writes, and of the check of the trial.
     """
     outcome = run(folder / "ik.xml")
     table = outcome.tables["ik_ik_marker_errors.sto"]
@@ -39,7 +40,7 @@ def compare_errors(folder: Path) -> tuple[np.ndarray, list[tuple[float, float]]]
 
 
 def check_errors(folder: Path) -> tuple[float, float]:
-    """Return root mean square and largest marker error of a checked trial in cm."""
+    """Return root mean square and largest marker error (cm) of a checked trial."""
     verdicts = [
         verdict
         for verdict in osimlite.check_trial(folder).verdicts
@@ -50,12 +51,12 @@ def check_errors(folder: Path) -> tuple[float, float]:
 
 
 def expect_close(numbers: tuple[float, float], expected: tuple[float, float]) -> None:
-    # The check reads a motion whose file has a few digits less.
+    # The check reads the motion from a file with fewer digits.
     assert numbers == pytest.approx(expected, rel=1e-3)
 
 
 def reduce(errors: np.ndarray) -> tuple[float, float]:
-    """Return root mean square and largest of the errors that are numbers."""
+    """Return root mean square and largest value of the errors that are not NaN."""
     return float(np.sqrt(np.nanmean(errors**2))), float(np.nanmax(errors))
 
 
@@ -69,7 +70,7 @@ def test_without_unseen_markers_all_agree(tmp_path: Path) -> None:
 
 
 def test_unseen_markers_count_in_the_table_of_opensim_alone(tmp_path: Path) -> None:
-    """A marker that is unseen adds no error; OpenSim's mean is over all markers all the same."""
+    """An invisible marker adds no error, but OpenSim's mean is over all markers."""
     errors, (summary, written, checked) = compare_errors(copy_lab("unseen", tmp_path))
     assert np.isnan(errors).any()
     expect_close(summary, reduce(errors))
@@ -102,7 +103,7 @@ def test_markers_without_weight_count_in_the_run_alone(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("how", ["not applied", "no task", "no tasks at all"])
 def test_markers_without_a_task(tmp_path: Path, how: str) -> None:
-    """Without any marker task all markers count, else only those of tasks that apply."""
+    """Without any marker task all markers count; otherwise only those of tasks that apply."""
     folder = copy_lab("unseen", tmp_path)
     change(folder / "ik.xml", ("<time_range>0 0.05<", "<time_range>0 0.01<"))
     task = ONE_TASK.format("SAC")

@@ -1,4 +1,4 @@
-"""Passive forces of a muscle in a trial: the law of Thelen's muscle, at the rows of the trial's time range."""
+"""Tests of passive muscle forces in a trial against Thelen's law, at rows of the trial's time range."""
 
 from __future__ import annotations
 
@@ -20,7 +20,18 @@ STRENGTH_N, OPTIMAL_M, TENDON_M = 200.0, 0.1, 0.02
 def write_trial(
     folder: Path, count: int, first: float = 0.1, last: float = 0.9, cutoff: float = -1.0
 ) -> TrialTool:
-    """A muscle that a motion of some rows in one second pulls to 1.35 of its optimal length, and a setup."""
+    """Write a muscle, a motion of one second that stretches it to 1.35 optimal fiber lengths, and a setup.
+
+    Args:
+        folder: folder of the files.
+        count: number of rows of the motion.
+        first: start of the time range (s).
+        last: end of the time range (s).
+        cutoff: cutoff frequency of the setup (Hz); negative for none.
+
+    Returns:
+        The setup as a tool of a trial.
+    """
     muscle = osimlite.Thelen2003Muscle(
         name="muscle",
         max_isometric_force=STRENGTH_N,
@@ -62,7 +73,7 @@ def write_trial(
 
 
 def passive(times: np.ndarray) -> np.ndarray:
-    """Thelen 2003, with the default shape 5 and strain 0.6 at the isometric force."""
+    """Compute the passive force by Thelen 2003, with the default shape 5 and strain 0.6 at the isometric force."""
     strain = 0.05 + 0.3 * np.sin(np.pi * times)
     return STRENGTH_N * (np.exp(5.0 * strain / 0.6) - 1.0) / (np.exp(5.0) - 1.0)
 
@@ -72,10 +83,10 @@ def test_forces_at_some_rows_of_the_range(tmp_path: Path, count: int) -> None:
     tool = write_trial(tmp_path, count)
     table = compute_passive_forces(tool, tmp_path / "motion.sto", is_states=False)
     assert table.columns == ("muscle",)
-    # The tendon takes some of the length.
+    # The tolerance covers the stretch of the tendon.
     np.testing.assert_allclose(table["muscle"], passive(table.times), rtol=0.05)
     inside = np.linspace(0.0, 1.0, count)
-    # As in OpenSim, the row before the range is the first one.
+    # As in OpenSim, the last row before the range is the first that is used.
     first = int(np.searchsorted(inside, 0.1 + 1e-9)) - 1
     inside = inside[first : int(np.searchsorted(inside, 0.9 + 1e-9))]
     assert set(table.times.round(9)) <= set(inside.round(9))
