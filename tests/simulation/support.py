@@ -247,7 +247,10 @@ INERTIA = (0.02, 0.03, 0.025, 0.001, -0.002, 0.003)
 
 
 def knee(*, opensim_derivatives: bool, inertia: Any = None) -> Mechanism:
-    """Return a shank on a reversed joint, one coordinate of which drives three rotations and a translation."""
+    """Return a thigh and a shank on equal joints, one of them reversed.
+
+    The first coordinate of each drives three rotations and a translation.
+    """
     axes = [
         JointAxis((0,), (0.0, 0.0, 1.0), f.IDENTITY),
         JointAxis((0,), (1.0, 0.1, 0.0), f.Polynomial((0.3, 0.5, 0.1))),
