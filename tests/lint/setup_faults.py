@@ -20,8 +20,10 @@ TEXTS["model.osim"] = gzip.decompress((SETUPS / "model.osim.gz").read_bytes()).d
 class Fault(NamedTuple):
     """Fault that replaces one text of a file by another.
 
-    The finding is expected in the file `found_in` (default: the changed file), on the line with the
-    text `line_of` (default: the changed line). The changes `also` to other files are made first.
+    A finding is expected in the file `found_in` (default: the changed file), on the line with the
+    text `line_of` (default: the changed line). The values ``first``, ``second:R.ASIS`` and
+    ``NumMarkers-values`` of `line_of` name certain lines, see `test_setup_faults.py`. The changes
+    `also` to other files are made first.
     """
 
     number: int | str  # number in the table of faults, or a name for a fault outside of it

@@ -74,7 +74,7 @@ def test_thresholds_of_a_project_move_what_is_found(tmp_path):
     "rule", [rule for rule in all_rules() if rule.thresholds], ids=lambda rule: rule.code
 )
 def test_each_threshold_moves_the_findings_of_its_rule(rule):
-    """Extreme values of each threshold change the findings in the failing fixtures of a rule."""
+    """Extreme values of each threshold change the findings in the fixtures of its rule."""
     fixtures = [
         path
         for kind in ("osim", "trial")

@@ -40,7 +40,7 @@ PIECES += [
 ]
 TAG = st.sampled_from(["a", "ab", "a.b", "a-c"])
 ATTRIBUTES = st.sampled_from(["", " x='>'", ' x="/>"', "\n x = '1'", ' x="a" y="/"'])
-# Constructs whose text looks like tags but contains none.
+# Comments, CDATA sections and processing instructions, in which tags do not count.
 HIDING = [
     "<!-- remark -->",
     "<!-- </a> -->",
