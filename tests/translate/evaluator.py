@@ -1,4 +1,4 @@
-"""Where the bodies of a model are, by its URDF and its file of coordinates alone: nothing of osimlite is used here."""
+"""Reader of URDF with a file of coordinates that does not use osimlite: it computes the poses of all bodies."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 
 
 def evaluate(law: Mapping[str, Any], x: Sequence[float]) -> float:
-    """A function of the file of coordinates."""
+    """Evaluate a function of the file of coordinates."""
     match law["type"]:
         case "constant":
             return law["value"]
@@ -73,14 +73,14 @@ def _lines(xs: Sequence[float], ys: Sequence[float], x: float) -> float:
 
 
 class Reader:
-    """A URDF with its file of coordinates."""
+    """Reader of a URDF with its file of coordinates."""
 
     def __init__(self, urdf: str, coordinates: str) -> None:
         self.root = ElementTree.fromstring(urdf)
         self.data = json.loads(coordinates)
 
     def coupled(self, q: Mapping[str, float]) -> dict[str, float]:
-        """Values by path, those of dependent coordinates made to fit; later couplers may depend on earlier ones."""
+        """Return values by path that fulfil the couplers; later couplers may depend on earlier ones."""
         values = dict(q)
         for _ in self.data["couplers"]:
             for coupler in self.data["couplers"]:
@@ -89,14 +89,14 @@ class Reader:
         return values
 
     def joint_values(self, q: Mapping[str, float]) -> dict[str, float]:
-        """F(q): values of all moving joints by name."""
+        """Return the values F(q) of all moving joints by name."""
         return {
             joint["name"]: evaluate(joint["function"], [q[path] for path in joint["coordinates"]])
             for joint in self.data["joints"]
         }
 
     def mimicked(self, values: Mapping[str, float]) -> dict[str, float]:
-        """Values of joints that mimic others, by the URDF, from those of their leaders."""
+        """Return the values of joints that mimic others in the URDF, from the values of their leaders."""
         result = {}
         for joint in self.root.iterfind("joint"):
             mimic = joint.find("mimic")
@@ -106,7 +106,7 @@ class Reader:
         return result
 
     def body_poses(self, q):
-        """Pose (4, 4) in ground of every body, by path."""
+        """Return the pose (4, 4) in ground of every body, by path."""
         values = self.joint_values(q)
         joints = list(self.root.iterfind("joint"))
         children = {joint.find("child").get("link") for joint in joints}

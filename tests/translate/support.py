@@ -1,4 +1,4 @@
-"""Models, data and comparisons that several test modules of this package share."""
+"""Models and records for the tests of translations."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tests.simple_models import make_single_body
 
 
 def kinds(urdf: Urdf) -> dict[str, list[str]]:
-    """Components by kind of record."""
+    """Return the components of all records by kind of record."""
     result: dict[str, list[str]] = {}
     for record in urdf.fidelity:
         result.setdefault(record.kind, []).append(record.component)
@@ -29,7 +29,7 @@ def unaccounted(model: Model, urdf: Urdf) -> list[str]:
 
 
 def one_body(*shapes, joint=None, **body) -> Model:
-    """A model of one body with these shapes, on a weld unless a joint is given."""
+    """Return a model of one body with these shapes, on a weld joint by default."""
     joint = joint or WeldJoint(name="weld")
     model = make_single_body(joint, name="one", body="block", mass=2.0, at=(0.0, 1.0, 0.0), **body)
     model["/bodyset/block"].attach(*shapes)

@@ -1,4 +1,4 @@
-"""A subject of AddBiomechanics as a folder of files: they are complete, and our tools run on them."""
+"""Tests of AddBiomechanics subjects as folders of files: the files are complete, and tools run on them."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def test_the_record_names_what_is_left_out(folder: Path) -> None:
     assert records["/trials/walk_0/passes/0-kinematics", "pass"]["how"] == "dropped"
     assert records["/trials/walk_0/markers", "marker"]["detail"] == "1 markers"
     point = records["/trials/walk_0/ground_forces", "center-of-pressure"]["errors"]["point"]
-    # The plates of the test are at 0.01 m, its centres of pressure at 0.
+    # The force plates of the test are at a height of 0.01 m, the centres of pressure at 0.
     assert point["unit"] == "m" and point["max"] < 0.02
     assert fidelity["translated"]["/trials/walk_0/coordinates"] == "trials/walk_0/coordinates.mot"
 
@@ -114,7 +114,7 @@ def test_another_pass_can_be_chosen(folder: Path, tmp_path: Path) -> None:
     done = run("convert", source, "--processing-pass", "kinematics", "-o", "k", folder=tmp_path)
     assert done.code == 0, done.err
     setup = (tmp_path / "k/trials/walk_0/inverse_dynamics.xml").read_text()
-    # The coordinates of this pass are not filtered yet.
+    # The coordinates of this pass are unfiltered, so the setup filters them.
     assert (
         "../../models/kinematics.osim" in setup
         and "<lowpass_cutoff_frequency_for_coordinates>6<" in setup

@@ -1,4 +1,4 @@
-"""Models for biorbd: segments, markers and muscles of a file give the poses of the model.
+"""Tests of models for biorbd: segments, markers and muscles of the file have the poses of the model.
 
 tests/oracle/test_biorbd.py compares with biorbd itself.
 """
@@ -21,7 +21,7 @@ from tests.io.b3d_files import make_walker
 
 
 def make_tilted() -> osimlite.Model:
-    """A walker with a hip whose axis is no axis of its frame, a marker and a muscle."""
+    """Return a walker with a hip about an oblique axis, a marker and a muscle."""
     model = make_walker()
     function = osimlite.LinearFunction(coefficients=(1.0, 0.0))
     axis = osimlite.TransformAxis(
@@ -46,7 +46,12 @@ def make_tilted() -> osimlite.Model:
 
 
 def find_segments(made: BioMod, values: dict[str, float]) -> dict[str, np.ndarray]:
-    """Return the poses of all segments of a text, with a value for each moving segment."""
+    """Return the poses of all segments of a text.
+
+    Args:
+        made: translation.
+        values: value of each moving segment.
+    """
     poses = {"base": np.eye(4)}
     numbers = iter(values.values())
     for name, body in re.findall(r"^segment (\S+)\n(.*?)^endsegment$", made.text, re.M | re.S):
@@ -101,7 +106,7 @@ def test_paths_that_biorbd_cannot_follow_have_measured_errors() -> None:
     muscle = osimlite.Thelen2003Muscle(name="turner")
     pelvis, tail = model["/bodyset/pelvis"], model["/bodyset/tail"]
     muscle.geometry_path.add_point(pelvis, (0.0, 0.1, 0.0))
-    # The range is never met: OpenSim's path is a straight line, biorbd's has a corner.
+    # The coordinate never reaches this range: OpenSim's path is straight, but biorbd's has a corner.
     muscle.geometry_path.path_point_set.objects.append(
         osimlite.ConditionalPathPoint(
             name="corner",
@@ -115,7 +120,7 @@ def test_paths_that_biorbd_cannot_follow_have_measured_errors() -> None:
     model.add(muscle)
     (record,) = [record for record in to_biomod(model).fidelity if record.kind == "path"]
     assert record.component == "/forceset/turner"
-    # The corner adds 0.1 m, and the rest of the path is longer by less.
+    # The corner adds 0.1 m, and the rest of the path is longer by less than that.
     assert 0.1 < record.errors["length"].rms < record.errors["length"].max < 0.2
     assert "moment arm about swing" in record.errors
 
@@ -157,7 +162,7 @@ READ_ATTRIBUTES = {
     },
     "viapoint": {"parent", "muscle", "musclegroup", "position"},
 }
-"""Attributes that biorbd 1.12.4 reads (`ModelReader.cpp`) and that are written; it ignores others."""
+"""Written attributes that biorbd 1.12.4 reads (`ModelReader.cpp`); it ignores all others."""
 
 
 def test_biorbd_knows_all_attributes() -> None:

@@ -1,4 +1,4 @@
-"""Models and motions as BVH: all bodies have their poses; and BVH as markers."""
+"""Tests of models and motions as BVH, in which all bodies keep their poses, and of BVH as markers."""
 
 from __future__ import annotations
 
@@ -20,7 +20,14 @@ from tests.io.b3d_files import make_walker
 
 
 def compare(path: Path, mechanism: Mechanism, values: np.ndarray, scale: float = 100.0) -> None:
-    """Compare rotations of bodies and centres of joints with those of a mechanism."""
+    """Compare rotations of bodies and centres of joints with those of a mechanism.
+
+    Args:
+        path: BVH file.
+        mechanism: the mechanism.
+        values: coordinates (t, n).
+        scale: length units of the file per metre.
+    """
     motion = read_bvh(path)
     names = [joint.name for joint in motion.joints]
     rotations, positions = motion.compute_poses()
@@ -44,7 +51,7 @@ def test_poses_of_a_motion_are_exact(tmp_path: Path) -> None:
     trajectory.to_bvh(tmp_path / "same.bvh", scale=1.0)
     compare(tmp_path / "same.bvh", trajectory.mechanism, trajectory.values, 1.0)
     records = json.loads((tmp_path / "fidelity.json").read_text())["records"]
-    # The hip centre of the walker slides on its platform.
+    # The hip centre of the walker slides on its platform, which is recorded.
     assert "/bodyset/Pelvis" in [
         each["component"] for each in records if each["kind"] == "translation"
     ]
@@ -75,7 +82,7 @@ def test_any_pose_of_a_tree_is_exact(tmp_path: Path) -> None:
     path.write_text("".join(osimlite.io.bvh.format_bvh(result.motion)))
     compare(path, mechanism, values)
     assert result.translating == () and not result.is_resampled
-    # One leg follows the other, as in the file.
+    # All joints of one leg come before those of the other, because a BVH file nests the joints.
     assert [joint.name for joint in result.motion.joints][:3] == ["pelvis", "calcn_r", "toes_r"]
 
 

@@ -1,4 +1,4 @@
-"""Collision shapes from contact geometry, and limits of effort and velocity."""
+"""Tests of collision shapes from contact geometry, and of limits of effort and velocity."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from tests.translate.support import kinds, one_body, unaccounted
 
 
 def with_surfaces():
-    """A block on a slider along X, with surfaces on it, over a half space that ground's Y axis leaves."""
+    """Return a block on a slider along X, with contact surfaces, over a half space below ground's plane y = 0."""
     model = one_body(joint=SliderJoint(name="slide", coordinates=[Coordinate(name="x")]))
     frame = model.add(
         PhysicalOffsetFrame(
@@ -64,7 +64,7 @@ def test_contact_geometry_becomes_collision_shapes_where_it_is(surfaces):
     root = ElementTree.fromstring(surfaces.text)
     (floor,) = root.findall("link[@name='world']/collision")
     assert floor.get("name") == "floor" and floor.find("geometry/box").get("size") == "1 200 200"
-    # Half the thickness below ground; the box's X axis points down.
+    # The box is half its thickness below ground; its X axis points down.
     assert [float(x) for x in floor.find("origin").get("xyz").split()] == pytest.approx(
         [0.0, -0.5, 0.0], abs=1e-15
     )
@@ -92,7 +92,7 @@ def test_what_collision_shapes_do_not_say_is_told(surfaces):
 
 
 def test_other_programs_touch_where_opensim_does(surfaces):
-    """The foot is 0.1 m under the block's -0.2 m, which the weld lifts by 1 m: it hangs 0.7 m over the floor."""
+    """The block is 1 m above ground, and the foot of radius 0.1 m is 0.2 m below it: it hangs 0.7 m above the floor."""
     with in_bullet(surfaces.text, surfaces.files) as bullet:
         assert (
             len(bullet.pb.getCollisionShapeData(bullet.body, bullet.links["block"], bullet.client))

@@ -1,4 +1,4 @@
-"""The driver: MuJoCo moves what osimlite pushes."""
+"""Tests of the driver, which lets MuJoCo integrate the forces of osimlite."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def test_a_ball_joint_turns_by_its_angular_velocity():
 
 
 def slung() -> Model:
-    """A body on an ellipsoid."""
+    """Return a body on an ellipsoid joint."""
     model = Model(name="shoulder")
     body = model.add(
         Body(
@@ -122,7 +122,7 @@ def slung() -> Model:
 
 
 def tied() -> Model:
-    """A chain whose coordinates are coupled, and whose end is at a distance from a point."""
+    """Return a chain with coupled coordinates, whose end stays at a distance from a point."""
     model = chain()
     couple = CoordinateCouplerConstraint(
         name="c",
@@ -243,8 +243,10 @@ def test_an_edited_file_is_driven(tmp_path):
 
 
 NEARLY = {"m0163": 3e-3, "m0466": 1e-3}
-"""Relative errors of models with a shoulder that a constraint nearly holds twice (5e-4 with Python
-3.11, 1.2e-3 with the later numpy of 3.13), and with a helper of 1 g.
+"""Tolerances, relative to the largest acceleration, of models that are less exact than 1e-8.
+
+In m0163 a constraint of the shoulder is nearly redundant (5e-4 with Python 3.11, 1.2e-3 with the later numpy of 3.13);
+m0466 has a helper body of 1 g.
 """
 
 

@@ -1,4 +1,4 @@
-"""Whole models: pictures, files, and an account that leaves nothing out."""
+"""Tests of complete URDF exports: visual shapes, files, and records of everything that is left out."""
 
 from __future__ import annotations
 
@@ -153,7 +153,7 @@ def test_primitives_keep_their_size_place_and_colour():
     assert box.find("geometry/box").get("size") == "4 1 0.5"
     assert ball.find("geometry/sphere").get("radius") == "0.3"
     assert tube.find("geometry/cylinder").attrib == {"radius": "0.1", "length": "1.4"}
-    # A cylinder of OpenSim stands along Y, one of URDF along Z.
+    # OpenSim's cylinders are along Y, those of URDF along Z.
     assert [float(x) for x in tube.find("origin").get("rpy").split()] == [-np.pi / 2, 0.0, 0.0]
     colors = {
         item.get("name"): item.find("color").get("rgba")
@@ -230,7 +230,7 @@ def test_what_cannot_be_drawn_is_told():
         "bone.vtp",
         "gone.obj",
     ] and "--geometry" in details[0].done
-    # A row of the table tells of all files that are not there.
+    # One row of the table names all missing files.
     assert ("/bodyset/block/block_geom_3", "/bodyset/block/block_geom_4") in {
         group.components for group in urdf.fidelity.groups()
     }
@@ -301,7 +301,7 @@ def test_real_models_are_accounted_for_and_load(corpus_model, capfd):
     q = np.where(
         [info.locked for info in robot.mechanism.coordinates], robot.mechanism.default_state()[0], q
     )
-    # What the URDF lets follow another joint must fit, for its readers make it so.
+    # URDF readers move joints that mimic another one, so that the couplers must hold.
     reader = Reader(urdf.text, urdf.coordinates)
     paths = [info.path for info in robot.mechanism.coordinates]
     values_by_path = reader.coupled(dict(zip(paths, q.tolist(), strict=True)))
@@ -320,7 +320,7 @@ def test_real_models_are_accounted_for_and_load(corpus_model, capfd):
             link, _ = robot.link_of[body.path]
             seen = bullet.inertial_frame(link.name)[:3, 3]
             assert np.abs(seen - (placed[link.name] @ [*link.center, 1.0])[:3]).max() < 1e-9
-    # Bullet complains of nothing but the inertias that the account names.
+    # Bullet only warns of the inertias that are recorded.
     said = capfd.readouterr().out
     impossible = {robot.link_of[path][0].name for path in kinds(urdf).get("inertia", [])}
     assert set(re.findall(r"setting inertia to zero for link: (\S+)", said)) == impossible

@@ -1,4 +1,4 @@
-"""An exporter is one entry of a table: the command line, its help and its messages follow from it."""
+"""Tests of the table of exporters: command line, help and messages follow from an entry."""
 
 from __future__ import annotations
 
@@ -44,8 +44,8 @@ def write_names(
 
 @pytest.fixture(autouse=True)
 def forget() -> Iterator[None]:
-    """Let the options of the command be looked up anew, in the test and after it."""
-    # The command takes its options from the exporters when its module is imported.
+    """Make the command import its options anew, in the test and after it."""
+    # The command reads its options from the exporters when its module is imported.
     sys.modules.pop("osimlite.cli.translate", None)
     yield
     sys.modules.pop("osimlite.cli.translate", None)

@@ -1,4 +1,4 @@
-"""Mesh files of a model: where they are found, and what they become."""
+"""Tests of mesh files of a model: where they are searched, and how they are converted."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def obj_text() -> str:
 
 @pytest.fixture
 def bones(tmp_path: Path, fixtures: Path) -> Path:
-    """A folder with a folder Geometry in it."""
+    """Return a folder with mesh files, one of them in its subfolder Geometry."""
     (tmp_path / "Geometry").mkdir()
     shutil.copy(fixtures / "meshes" / "appended-raw-zlib.vtp", tmp_path / "Geometry" / "Femur.vtp")
     (tmp_path / "pelvis.stl").write_bytes(stl_text())
@@ -61,7 +61,7 @@ def load(urdf: Urdf, file: str):
 
 # ------------------------------------------------------------------------------------------------ what they become
 def test_vtk_surfaces_become_obj_files_that_others_read_alike(bones):
-    """Volume, and colour and size: by trimesh, Bullet and MuJoCo."""
+    """Compare volume, colour and size in trimesh, Bullet and MuJoCo."""
     red = Appearance(color=(0.8, 0.1, 0.1), opacity=0.5)
     model = one_body(Mesh(mesh_file="Femur.vtp", scale_factors=(0.1, 0.2, 0.3), appearance=red))
     urdf = to_urdf(model, folder=bones)
@@ -107,7 +107,7 @@ def test_text_stl_becomes_binary_which_bullet_reads(bones):
     assert load(urdf, "meshes/pelvis.stl").volume == pytest.approx(1 / 6)
     with in_bullet(urdf.text, urdf.files) as bullet:
         assert len(bullet.pb.getVisualShapeData(bullet.body, physicsClientId=bullet.client)) == 1
-    # What is binary already keeps its triangles, and nothing else.
+    # A binary file keeps its triangles, and loses everything else.
     assert format_binary_stl(b"secret".ljust(80) + content[80:] + b"secret", "x.stl") == content
 
 

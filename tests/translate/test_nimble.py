@@ -1,4 +1,4 @@
-"""Models of Nimble rewritten for OpenSim: poses follow Nimble's formulas.
+"""Tests of Nimble's models rewritten for OpenSim: poses follow Nimble's formulas.
 
 tests/oracle/test_nimble.py compares with Nimble itself.
 """
@@ -220,7 +220,7 @@ def test_an_ellipsoid_joint_moves_as_nimbles() -> None:
     radii = np.array(model["/jointset/j"].radii_x_y_z)
     (change,) = convert_from_nimble(model)
     assert "90 degrees about Z" in change.done
-    # A model is not turned twice.
+    # A converted model is not rotated a second time.
     assert not convert_from_nimble(model)
     mechanism = osimlite.mechanism(osimlite.read_text(osimlite.to_text(model)))
     base = np.eye(4)
@@ -254,7 +254,7 @@ def test_a_spline_continues_as_a_cubic_over_the_range() -> None:
 
     for argument in np.linspace(0.0, 1.0, 30):
         assert value(after, argument) == pytest.approx(value(before, argument), abs=1e-13)
-    # Differences of third order of a cubic are constant.
+    # Third differences of a cubic are constant.
     for start, inner in ((1.0, 0.7), (0.0, 0.0)):
         step = 0.075 if start else -0.075
         values = [value(after, start + k * step) for k in range(8)]

@@ -1,4 +1,4 @@
-"""The file of coordinates: it and the URDF are enough to know where every body is."""
+"""Tests of the file of coordinates: together with the URDF it gives the pose of every body."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ from tests.translate.evaluator import Reader, evaluate
 
 
 def worst(reader: Reader, mechanism: Mechanism, q) -> float:
-    """Largest difference between the bodies' poses of the mechanism and those of the reader."""
+    """Return the largest difference between poses of bodies in the mechanism and by the reader."""
     values = dict(zip((info.path for info in mechanism.coordinates), q.tolist(), strict=True))
     poses, state = reader.body_poses(values), mechanism.at(q)
     assert poses.keys() == {"/ground", *(body.path for body in mechanism.bodies)}
@@ -94,7 +94,7 @@ def test_urdf_and_coordinates_of_real_models_say_where_bodies_are(corpus_model):
         values |= locked
         q = np.array([values[item["path"]] for item in coordinates])
         assert worst(reader, mechanism, q) < 1e-9
-        # Joints that mimic others get the value that they have by their own function.
+        # The linear function of a mimic joint gives the same value as its own function.
         joints = reader.joint_values(values)
         for name, value in reader.mimicked(joints).items():
             assert value == pytest.approx(joints[name], abs=1e-12)
@@ -190,7 +190,7 @@ def test_no_function_is_forgotten():
         for cls in below(SmoothFunction)
         if cls.__module__.startswith("osimlite.mechanics.multibody")
     }
-    # An error of Simbody's accelerations is no part of a pose.
+    # The error of Simbody's accelerations does not change poses.
     assert ours - {AccelerationErrorAngle} == {type(function) for function, _ in FUNCTIONS}
 
     class Other(SmoothFunction):
@@ -219,7 +219,7 @@ def test_the_guide_describes_the_file(repo):
 
 
 def test_axes_along_straight_splines_are_joints_of_one_coordinate():
-    """As in spine models, whose coordinates turn the first vertebra by splines through two points."""
+    """Spine models rotate the first vertebra by splines through two points."""
     z, x = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
     axes = [
         JointAxis((0,), z, f.SimmCubicSpline((-1.5, 1.5), (-1.5, 1.5))),
@@ -242,7 +242,7 @@ def test_axes_along_straight_splines_are_joints_of_one_coordinate():
 
 # -------------------------------------------------------------------------------------------------------- couplers
 def chain(*laws: tuple[int, int, SchemaFunction], count: int = 4) -> Model:
-    """Pins a, b, c, d one on the other; each law makes the first coordinate that function of the second."""
+    """Return pins a, b, c, d in a chain; each law makes the first coordinate a function of the second."""
     model, carrier = Model(name="chain"), None
     for name in "abcd"[:count]:
         body = model.add(
@@ -315,7 +315,7 @@ def test_curved_couplers_circles_and_locks_are_left_to_the_file():
 
 
 def test_a_joint_that_is_a_multiple_of_its_coordinate_may_lead():
-    """As in spine models, in which the first vertebra turns by a share of the coordinate, and so do the others."""
+    """In spine models, each vertebra rotates by a fraction of a coordinate."""
     model = Model(name="spine")
     shares, carrier = (0.2, 0.3), None
     for k, share in enumerate(shares):
@@ -361,7 +361,7 @@ def test_couplers_in_a_circle_keep_their_ratios():
         return {name: (mimic.leader, mimic.line.slope) for name, mimic in mimics.items()}
 
     assert find_lines((1, 0, 2.0), (0, 1, 0.5)) == {"b": ("a", 2.0)}
-    # The first coordinate depends on the circle, and is no part of it.
+    # The first coordinate depends on the circle of couplers, but is not part of it.
     assert find_lines((0, 2, 3.0), (2, 1, 2.0), (1, 2, 0.5)) == {"a": ("b", 6.0), "c": ("b", 2.0)}
 
 

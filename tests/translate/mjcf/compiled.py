@@ -1,4 +1,4 @@
-"""What MuJoCo makes of a translation."""
+"""Translations to MJCF, compiled by MuJoCo."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ from osimlite.translate.mjcf.export import Mjcf
 
 
 class Compiled:
-    """A translation as MuJoCo has it, bodies and joints by name.
+    """Translation that MuJoCo has compiled, with bodies and joints by name.
 
-    Args: mjcf: what to compile. own: give bodies the model's own inertias where they are
-        impossible, and what is not of the model none.
+    Args:
+        mjcf: translation.
+        own: restore impossible inertias of the model, and set those of added bodies to zero.
     """
 
     def __init__(self, mjcf: Mjcf, *, own: bool = False) -> None:
@@ -36,13 +37,13 @@ class Compiled:
         mujoco.mj_forward(self.model, self.data)
 
     def body(self, name: str) -> Array:
-        """Pose (4, 4) of a body in ground."""
+        """Return the pose (4, 4) of a body in ground."""
         body = self.data.body(name)
         return make_transform(body.xmat.reshape(3, 3), body.xpos)
 
     def mass_matrix(self, q: Array) -> Array:
-        """Mass matrix (n, n) for the rates of the coordinates, at the pose that `place` was given."""
-        # mj_fullM takes other arguments in 3 than in 4.
+        """Return the mass matrix (n, n) for the rates of the coordinates, at the pose of `place`."""
+        # mj_fullM has different arguments in MuJoCo 3 and 4.
         whole = np.zeros((self.model.nv, self.model.nv))
         for row, unit in zip(whole, np.eye(self.model.nv), strict=True):
             mujoco.mj_mulM(self.model, self.data, row, unit)

@@ -1,4 +1,4 @@
-"""Both versions of MuJoCo."""
+"""Fixture of an older version of MuJoCo."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ OLDER = "3.3.7"
 
 @pytest.fixture(scope="session")
 def older(request) -> str:
-    """A Python that has MuJoCo 3."""
+    """Return the path of a Python in which MuJoCo 3 is installed."""
     place = request.config.cache.mkdir(f"mujoco-{OLDER}")
     python = place / ("Scripts" if sys.platform == "win32" else "bin") / "python"
     uv = shutil.which("uv")

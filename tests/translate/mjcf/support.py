@@ -1,4 +1,4 @@
-"""Models, data and comparisons that several test modules of this package share."""
+"""Models, data and comparisons for the tests of MJCF files."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ from tests.translate.mjcf.compiled import Compiled
 
 
 def assert_refused(corpus_model: CorpusModel, error: OsimliteError) -> None:
-    """What is refused here, reading or simulation refuses with the same words."""
+    """Assert that reading or simulation refuses a model with the same message."""
     with pytest.raises(type(error)) as result:
         model = osimlite.read(corpus_model.path)
         osimlite.simulate(model, to=1e-6, folder=corpus_model.path.parent, skip_unsupported=True)
@@ -60,7 +60,7 @@ INERTIA = (0.1, 0.1, 0.1, 0, 0, 0)
 
 
 def on_a_function(function, *, range=(-1.0, 2.0), name="tx") -> Model:
-    """A body that turns by a coordinate, and slides by a function of it."""
+    """Return a body that rotates by a coordinate, and slides by a function of it."""
     model = Model(name="one")
     body = model.add(Body(name="b", mass=1.0, inertia=INERTIA))
     joint = CustomJoint(
@@ -76,7 +76,7 @@ def on_a_function(function, *, range=(-1.0, 2.0), name="tx") -> Model:
 
 
 def equalities(compiled: Compiled) -> dict[str, tuple[str | None, np.ndarray]]:
-    """The leader and the polynomial of every joint that follows, as MuJoCo has them."""
+    """Return leader and polynomial of every dependent joint in MuJoCo."""
     model, result = compiled.model, {}
     for k in range(model.neq):
         if model.eq_type[k] == mujoco.mjtEq.mjEQ_JOINT:
@@ -89,7 +89,7 @@ def equalities(compiled: Compiled) -> dict[str, tuple[str | None, np.ndarray]]:
 
 
 def off(compiled: Compiled, q: np.ndarray) -> dict[str, float]:
-    """How far each following joint is from where the model has it, with all others where the model has them."""
+    """Return the error of each dependent joint, with all other joints at their values in the model."""
     values = compiled.mjcf.joint_values(q)
     return {
         name: float(np.polynomial.polynomial.polyval(values[leader] if leader else 0.0, polynomial))
@@ -100,7 +100,7 @@ def off(compiled: Compiled, q: np.ndarray) -> dict[str, float]:
 
 
 def coupled(function) -> Model:
-    """A second body that turns by a coordinate which a coupler makes a function of the first one's."""
+    """Return a model with a second body, whose coordinate a coupler makes a function of the first one."""
     model = on_a_function(LinearFunction(coefficients=(0.1, 0.0)))
     body = model.add(Body(name="c", mass=1.0, inertia=INERTIA))
     joint = CustomJoint(name="k", coordinates=[Coordinate(name="beta", range=(-9.0, 9.0))])
@@ -125,7 +125,7 @@ A, B = "/bodyset/b1", "/bodyset/b3"
 
 
 def chain(*forces) -> Model:
-    """A slide, a pin, a universal joint and a pin, each turned against the one before."""
+    """Return a slide, a pin, a universal joint and a pin, each rotated relative to the one before."""
     model = Model(name="chain")
     below, count = model.ground, 0
     for number, kind in enumerate((SliderJoint, PinJoint, UniversalJoint, PinJoint)):
@@ -162,12 +162,12 @@ HOSTILE = (
 
 
 def hostile(names: Iterable[str]) -> Model:
-    """Bodies, joints, coordinates, muscles, markers, frames and geometries with these names, one after the other."""
+    """Return a model with bodies, joints, coordinates, muscles and other components that have these names in turn."""
     given = iter(names)
     taken: set[tuple[str, str]] = set()
 
     def name(of: str = "") -> str:
-        """The next; one that a component of the same set has not, where there is a set."""
+        """Return the next name, with additions that make it unique in a set."""
         text = next(given)
         while (of, text) in taken:
             text += "'"

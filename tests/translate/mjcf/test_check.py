@@ -1,4 +1,4 @@
-"""What the check of a file says of files that are as wrong as we make them."""
+"""Tests of `check_mjcf` on a translation of osimlite, and on files with known faults."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Constraints and contact in MuJoCo: what holds, and where."""
+"""Tests of constraints and contact in MuJoCo: what holds, and with which error."""
 
 from __future__ import annotations
 
@@ -31,7 +31,11 @@ B = "/bodyset/b2"
 
 
 def settled(model, seconds: float = 0.2) -> tuple[Compiled, np.ndarray]:
-    """The translation a while after it was let go in its default pose, and the coordinates there."""
+    """Simulate a translation from its default pose.
+
+    Returns:
+        Compiled translation, and final coordinates.
+    """
     compiled = Compiled(to_mjcf(model))
     mujoco.mj_resetDataKeyframe(compiled.model, compiled.data, 0)
     for _ in range(int(seconds / compiled.model.opt.timestep)):
@@ -41,7 +45,7 @@ def settled(model, seconds: float = 0.2) -> tuple[Compiled, np.ndarray]:
 
 
 def on(frame: str, *point: float) -> tuple[float, ...]:
-    """Where a point of a body is in ground, in a pose that is a little off the default one."""
+    """Return the position of a body's point in ground, in a pose near the default pose."""
     mechanism = osimlite.mechanism(chain())
     return tuple(mechanism.station_position(frame, point, mechanism.values({}) + 0.05).tolist())
 
@@ -118,7 +122,7 @@ def test_a_constraint_that_mujoco_has_not_is_told():
 
 # ------------------------------------------------------------------------------------------------------- contact
 def falling(*, on_a_body: bool = False):
-    """A ball above a tilted floor, which is fixed to ground or to a body that can move."""
+    """Return a ball above a tilted floor, which is fixed to ground or to a body that can move."""
     model = osimlite.Model(name="fall")
     ball = model.add(Body(name="ball", mass=2.0, inertia=(0.01, 0.01, 0.01, 0, 0, 0)))
     values = (0.0, 0.0, 0.0, 0.1, 0.3, 0.0)

@@ -1,4 +1,4 @@
-"""Real models in MuJoCo: bodies, mass matrix, functions, and an account that leaves nothing out."""
+"""Tests of corpus models in MuJoCo: poses, mass matrices, functions, and complete records of what changes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tests.translate.support import unaccounted
 
 
 def random_pose(mechanism: Mechanism, random: np.random.Generator) -> Array:
-    """A pose in the ranges, as far as they mean anything, that fulfils locks and couplers."""
+    """Return a random pose within plausible ranges that fulfils locks and couplers."""
     q = mechanism.values({})
     for index, info in enumerate(mechanism.coordinates):
         low, high = info.range
@@ -34,7 +34,7 @@ def random_pose(mechanism: Mechanism, random: np.random.Generator) -> Array:
 
 
 def run(compiled: Compiled) -> None:
-    """Move for a second, or a thousand steps if they are small, from the default pose; the report says why not."""
+    """Simulate a thousand steps from the default pose; a model that diverges must have a record of the reason."""
     model, data = compiled.model, compiled.data
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
     for _ in range(1000):

@@ -1,4 +1,4 @@
-"""Functions of coordinates in MuJoCo: exact where they are polynomials, else off by what their record says."""
+"""Tests of functions of coordinates in MuJoCo: polynomials are exact, others have the errors that are recorded."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def test_other_functions_are_off_by_what_is_said(function):
     error = record.errors["value"]
     assert error.unit == "m" and np.abs(differences).max() == pytest.approx(error.max, rel=0.02)
     assert np.sqrt(np.mean(np.square(differences))) == pytest.approx(error.rms, rel=0.05)
-    # As good as it gets: the largest error is reached, with changing signs, six times.
+    # The fit is optimal: the largest error occurs six times with alternating signs (Chebyshev).
     peaks = [value for value in differences if abs(value) > 0.9 * error.max]
     assert np.count_nonzero(np.diff(np.sign(peaks))) >= 5
 
@@ -105,7 +105,7 @@ def test_couplers_are_composed_into_the_functions_of_the_coordinate():
     model = coupled(LinearFunction(coefficients=(0.5, 0.2)))
     mjcf = to_mjcf(model)
     assert not mjcf.fidelity.records
-    # (q / 2 + 0.2)^2
+    # The polynomial is (q / 2 + 0.2)^2.
     leader, polynomial = equalities(Compiled(mjcf))["beta_rx"]
     assert leader == "q"
     np.testing.assert_allclose(polynomial, (0.04, 0.2, 0.25, 0.0, 0.0), rtol=0.0, atol=1e-15)

@@ -1,4 +1,4 @@
-"""Whole models: files, names, the account, and both versions of MuJoCo."""
+"""Tests of complete MJCF exports: files, names, records, and both versions of MuJoCo."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from tests.translate.mjcf.compiled import Compiled
 from tests.translate.mjcf.conftest import OLDER
 from tests.translate.support import unaccounted
 
-# Prints where all bodies of each file are at its keyframe.
+# Script that prints the poses of all bodies of each file at its keyframe.
 READER = """
 import json, sys, mujoco
 for path in sys.argv[1:]:
@@ -71,7 +71,7 @@ def test_every_component_of_the_walker_is_accounted_for():
 
 # -------------------------------------------------------------------------------------------------- names and files
 def twins() -> Model:
-    """Two legs whose joints have coordinates of one name, on bodies with shapes and markers."""
+    """Return two legs with equal coordinate names, on bodies with shapes and markers."""
     model = Model(name="two legs")
     for side in "lr":
         body = model.add(Body(name=f"leg_{side}", mass=1.0, inertia=(0.1, 0.1, 0.1, 0, 0, 0)))
@@ -101,10 +101,10 @@ def test_names_are_those_of_the_model_and_paths_where_two_share_one():
     assert {model.site(k).name for k in range(model.nsite)} == {"toe_l", "toe_r"}
     np.testing.assert_array_equal(model.site("toe_r").pos, (0.1, 0.2, 0.3))
     np.testing.assert_allclose(model.geom("leg_l_geom_2").size, (0.1, 0.2, 0.3), rtol=1e-15)
-    # Nothing that is only looked at touches anything, or has a mass.
+    # Visual shapes collide with nothing, and have no mass.
     assert not model.geom_contype.any() and not model.geom_conaffinity.any()
     assert model.body("leg_l").mass == 1.0
-    # The camera looks along the horizon, upright.
+    # The camera is upright and looks along the horizon.
     np.testing.assert_allclose(
         model.camera("side").mat0.reshape(3, 3), np.eye(3), rtol=0.0, atol=1e-12
     )

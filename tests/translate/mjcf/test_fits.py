@@ -1,4 +1,4 @@
-"""Tendons around what MuJoCo has not: ellipsoids, tori, points that move, several surfaces."""
+"""Tests of tendons that approximate what MuJoCo lacks: ellipsoids, tori, moving points, several surfaces."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from osimlite.translate.mjcf.tendons import TendonSite, WrapGeom
 
 
 def joint_with(surface):
-    """A pin between two bodies, and a cable from the one to the other around a surface at the pin."""
+    """Return two bodies on a pin, and a muscle between them that wraps around a surface at the pin."""
     model = Model(name="joint")
     body = model.add(Body(name="arm", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
     pin = PinJoint(name="pin")

@@ -1,4 +1,4 @@
-"""Forces and actuators in MuJoCo against the same in osimlite's own simulation, which has OpenSim's laws."""
+"""Tests of forces and actuators in MuJoCo against osimlite's simulation, which has OpenSim's laws."""
 
 from __future__ import annotations
 
@@ -31,7 +31,17 @@ from tests.translate.mjcf.support import A, B, chain
 
 
 def both(model: Model, q, u, control: float = 0.7) -> tuple[np.ndarray, np.ndarray]:
-    """Applied generalized forces in the order of the coordinates: MuJoCo's, and osimlite's."""
+    """Compute the applied generalized forces in the order of the coordinates.
+
+    Args:
+        model: the model.
+        q: coordinates.
+        u: speeds.
+        control: control of all actuators.
+
+    Returns:
+        Forces of MuJoCo and of osimlite.
+    """
     mechanism = osimlite.mechanism(model)
     forces = force_elements(model, mechanism)
     system = System(mechanism, forces, code=PYTHON_CODE)

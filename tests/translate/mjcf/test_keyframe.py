@@ -1,4 +1,4 @@
-"""Where simulations of MJCF files have to start, and that they run from there."""
+"""Tests of the keyframe from which simulations of MJCF files must start."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def test_gait2392_runs_from_its_keyframe(shared: Path) -> None:
         errors.append(
             np.abs(data.efc_pos[data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY]).max()
         )
-    # What the note says of qpos0 and of the keyframe.
+    # The numbers in the note on qpos0 and on the keyframe are right.
     assert errors[0] > 0.01 and errors[1] < 1e-4
     while data.time < 0.5:
         mujoco.mj_step(model, data)

@@ -1,4 +1,4 @@
-"""Muscles, in MuJoCo's own eyes, against those of the model."""
+"""Tests of muscles as MuJoCo computes them, against those of the model."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Models with names that nobody should give: MuJoCo takes every one of them, and no two things have one name."""
+"""Tests of models with hostile names: MuJoCo accepts every export, and all names are unique."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ NAMES = st.one_of(
 
 
 def named(text: str) -> list[tuple[str, str]]:
-    """The tag and the name of everything in the world of an MJCF that has a name, as a reader of XML has it."""
+    """Return tag and name of every named element in the world of an MJCF, as an XML parser reads them."""
     world = etree.fromstring(text.encode()).find("worldbody")
     assert world is not None
     return [
@@ -42,7 +42,7 @@ def test_mujoco_takes_models_with_any_names(names: list[str]) -> None:
     try:
         mjcf = osimlite.to_mjcf(hostile(names))
     except osimlite.OsimliteError as refusal:
-        # A wrap tells its surface by a name without slashes and spaces around it.
+        # A PathWrap refers to its surface by a name without slashes, and without spaces at its ends.
         assert "wrap_object" in str(refusal)
         return
     compiled = mujoco.MjModel.from_xml_string(mjcf.text, mjcf.files)

@@ -1,4 +1,4 @@
-"""Models with numbers that nobody should give: MuJoCo takes the export, or one sentence refuses it."""
+"""Tests of models with extreme numbers: MuJoCo accepts the export, or a one-line error refuses it."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ OPTIONS = st.sampled_from(
 
 
 def numbers(model: Model) -> list[tuple[Object, str, int | None]]:
-    """Where a model has a number: in what, in which property, and which of several."""
+    """Return all numbers of a model as object, property, and index in a list."""
 
     def held(thing: Object) -> Iterator[tuple[Object, str, int | None]]:
         for name in type(thing).model_fields:
@@ -69,7 +69,7 @@ def numbers(model: Model) -> list[tuple[Object, str, int | None]]:
 
 
 def taken(model: Model, **options: Any) -> bool:
-    """Whether there is an export, which MuJoCo then takes."""
+    """Return whether the model can be exported; MuJoCo must accept the export."""
     try:
         mjcf = osimlite.to_mjcf(model, **options)
     except OsimliteError as refusal:

@@ -1,4 +1,4 @@
-"""Muscles of old files as MuJoCo's: their speed comes from their time_scale."""
+"""Tests of muscles of old formats in MuJoCo: their velocity follows from time_scale."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from tests.lint.verdict_cases import path_of, small_model
 
 
 def translate(kind: str, **properties: float):
-    """Return the actuator of a muscle, and what is said of it."""
+    """Return the actuator of a muscle, and its records."""
     inside = "".join(f"<{name}>{value}</{name}>" for name, value in properties.items())
     muscle = (
         f'<{kind} name="t">{path_of(("/ground", "0 0.1 0"), ("/bodyset/a", "0 0 0"))}{inside}'

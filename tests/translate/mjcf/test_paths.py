@@ -1,4 +1,4 @@
-"""Tendons, in MuJoCo's own eyes, against the paths of the model."""
+"""Tests of the lengths of tendons in MuJoCo against the paths of the model."""
 
 from __future__ import annotations
 
@@ -32,7 +32,15 @@ POSES = 30
 
 
 def errors(model, **options):
-    """What is wrong with the length of each tendon (P,), m, by name, in poses of their own."""
+    """Translate a model, and compare its tendons at random poses.
+
+    Args:
+        model: the model.
+        options: options of the translation.
+
+    Returns:
+        Translation, and errors of the length (m) at all poses, by muscle.
+    """
     mjcf = to_mjcf(model, visuals=False, **options)
     compiled, paths = Compiled(mjcf), osimlite.paths(model)
     result = {name.rpartition("/")[2]: [] for name in paths.names}

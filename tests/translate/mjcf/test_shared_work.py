@@ -1,4 +1,4 @@
-"""What an export computes once and uses again is what it would compute anew."""
+"""Tests of results that an export reuses: they equal those that are computed anew."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How well MuJoCo keeps what joints and points follow, as docs/mujoco.md says."""
+"""Tests of the errors of MuJoCo's soft constraints on joints and points, as stated in docs/mujoco.md."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The time step of a file, and what is told of models that no step helps."""
+"""Tests of the time step of a file, and of warnings about models that no time step makes stable."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ BLOCK = "/bodyset/block"
 
 
 def sled(*forces: Any) -> Model:
-    """A block of 2 kg, 0.1 m along its slide from ground."""
+    """Return a block of 2 kg on a slide, 0.1 m from ground."""
     return make_slide(
         *forces, coordinate="slide_coord_0", default_value=0.1, body="block", mass=2.0
     )

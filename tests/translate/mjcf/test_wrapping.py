@@ -1,4 +1,4 @@
-"""Our own form of MuJoCo's wrapping against MuJoCo itself."""
+"""Tests of osimlite's implementation of MuJoCo's wrapping against MuJoCo."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from osimlite.translate.mjcf.wrapping import bend_tendon
 
 RADIUS = 0.5
 
-# Prints the version, and the length of the tendon with its ends at each of the pairs of places.
+# Script that prints the version, and the lengths of the tendon for pairs of end points.
 READER = """
 import json, sys, mujoco
 text, ends = json.load(sys.stdin)
@@ -29,7 +29,12 @@ print(json.dumps([mujoco.__version__, lengths]))
 
 
 def text(kind, side):
-    """A tendon between two bodies that can be put anywhere, around a geom at the origin."""
+    """Return an MJCF of a tendon between two movable bodies, around a geom at the origin.
+
+    Args:
+        kind: type of the geom.
+        side: position of the side site; None for none.
+    """
     where = (
         "" if side is None else f'<site name="side" pos="{" ".join(map(repr, side.tolist()))}"/>'
     )

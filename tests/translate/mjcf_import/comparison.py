@@ -10,8 +10,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-# OpenSim's wheel brings a CasADi of its own: it cannot be loaded into a process after another one.
-# Imported here, it is loaded while tests are collected, before any of them runs.
+# OpenSim's wheel contains a CasADi, which cannot be loaded after another one. Import OpenSim here, so that it is loaded
+# while tests are collected, before any of them runs.
 with contextlib.suppress(ImportError):
     import opensim  # noqa: F401
 
@@ -21,7 +21,13 @@ from osimlite.translate.mjcf_import.convert import Osim
 
 
 def random_qpos(model: Any, count: int, seed: int = 0) -> Iterator[Array]:
-    """Yield random poses of MuJoCo."""
+    """Yield random poses of MuJoCo.
+
+    Args:
+        model: MuJoCo's model.
+        count: number of poses.
+        seed: seed of the random numbers.
+    """
     random = np.random.default_rng(seed)
     for _ in range(count):
         qpos = model.qpos0 + random.uniform(-1.0, 1.0, model.nq)
@@ -30,7 +36,7 @@ def random_qpos(model: Any, count: int, seed: int = 0) -> Iterator[Array]:
 
 
 def pose_errors(path: Path, made: Osim, count: int) -> float:
-    """Return the largest difference of positions (m) and rotation matrices of bodies."""
+    """Return the largest difference of positions (m) and of entries of rotation matrices of bodies."""
     model = mujoco.MjModel.from_xml_path(str(path))
     data, mechanism = mujoco.MjData(model), osimlite.mechanism(made.model)
     worst = 0.0
@@ -46,7 +52,7 @@ def pose_errors(path: Path, made: Osim, count: int) -> float:
 
 
 def body_names(model: Any, made: Osim) -> list[tuple[int, str]]:
-    """Return the index of each body of MuJoCo but the world, and the name of the OpenSim body."""
+    """Return the index of each body of MuJoCo except the world, and the name of the OpenSim body."""
     result = []
     for body in range(1, model.nbody):
         name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_BODY, body) or f"body_{body}"
@@ -63,9 +69,9 @@ def mass_matrix(model: Any, data: Any) -> Array:
 
 
 def speed_jacobian(model: Any, made: Osim, qpos: Array) -> Array:
-    """Return MuJoCo's velocities (nv, n) for unit rates of the coordinates, rotors left out.
+    """Return MuJoCo's velocities (nv, n) for unit rates of the coordinates, without rotors.
 
-    By central differences of the orientation for balls and free joints.
+    Ball and free joints are differentiated by central differences of the orientation.
     """
     names = made.coordinates.names()
     values = made.coordinates.values(qpos)
@@ -87,7 +93,7 @@ def speed_jacobian(model: Any, made: Osim, qpos: Array) -> Array:
 
 
 def body_rates(angles: list[float]) -> Array:
-    """Return the angular velocity (3, 3) in the body for rates of body-fixed X-Y-Z angles."""
+    """Return the matrix (3, 3) from the rates of body-fixed X-Y-Z angles to the angular velocity in the body."""
     _, y, z = angles
     return np.array(
         (
@@ -99,7 +105,7 @@ def body_rates(angles: list[float]) -> Array:
 
 
 def projection(made: Osim, order: list[str]) -> Array:
-    """Return the rates (n, m) of all coordinates for unit rates of those that are no rotors."""
+    """Return the rates (n, m) of all coordinates for unit rates of the coordinates without rotors."""
     names = made.coordinates.names()
     matrix = np.zeros((len(order), len(names)))
     for row, name in enumerate(order):
@@ -108,7 +114,7 @@ def projection(made: Osim, order: list[str]) -> Array:
 
 
 def mass_errors(path: Path, made: Osim, count: int) -> float:
-    """Return the largest relative difference of the mass matrices, with rotors where there are any."""
+    """Return the largest relative difference of the mass matrices, including rotors."""
     model = mujoco.MjModel.from_xml_path(str(path))
     if not made.coordinates.rotors:
         model.dof_armature[:] = 0.0
@@ -133,7 +139,7 @@ def mass_errors(path: Path, made: Osim, count: int) -> float:
 
 
 class LiveModel:
-    """A converted model in OpenSim, posed by coordinate values."""
+    """Converted model in OpenSim, posed by coordinate values."""
 
     def __init__(self, made: Osim, folder: Path) -> None:
         import opensim
@@ -190,16 +196,16 @@ def actuator_torques(path: Path, qpos: Array, qvel: Array, control: float, name:
     """Return MuJoCo's generalized forces (nv,) of one actuator.
 
     Args:
-        path: the file.
+        path: MJCF file.
         qpos: positions.
         qvel: velocities.
-        control: of the actuator; its activation is the same.
-        name: the actuator.
+        control: control and activation of the actuator.
+        name: name of the actuator.
     """
     model = mujoco.MjModel.from_xml_path(str(path))
     for actuator in range(model.nu):
         if model.actuator(actuator).name != name:
-            # Without gain and bias it gives no force.
+            # Without gain and bias, an actuator has no force.
             model.actuator_gainprm[actuator] = model.actuator_biasprm[actuator] = 0.0
             model.actuator_gaintype[actuator] = mujoco.mjtGain.mjGAIN_FIXED
             model.actuator_biastype[actuator] = mujoco.mjtBias.mjBIAS_NONE
@@ -219,7 +225,7 @@ class LiveForces:
         self.order = [order.index(name) for name in self.names]
 
     def accelerations(self, qpos: Array, qvel: Array, control: float, names: list[str]) -> Array:
-        """Return the accelerations (n,) where only forces of these names act."""
+        """Return the accelerations (n,) when only forces of these names act."""
         live = self.live
         live.place(self.made.coordinates.values(qpos))
         for name, speed in zip(self.names, qvel, strict=True):

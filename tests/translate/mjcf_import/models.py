@@ -1,4 +1,4 @@
-"""Small MJCF files, and places of public ones."""
+"""Small MJCF files, and paths of public ones."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def write_mjcf(folder: Path, text: str, name: str = "model.xml") -> Path:
 
 
 def public(name: str) -> Path:
-    """Return the path of a public model; skip the test where it is missing."""
+    """Return the path of a public model; skip the test if the file does not exist."""
     path = PUBLIC / name
     if not path.is_file():
         pytest.skip(

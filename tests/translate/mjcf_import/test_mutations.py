@@ -1,4 +1,4 @@
-"""Damaged MJCF files end in one clear error, or in a model that can be written and read."""
+"""Tests of damaged MJCF files: a clear error, or a model that can be written and read."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tests.suite import choose
 from tests.translate.mjcf_import import models
 
 WANTED = choose(5, 10)
-"""Damaged files of each batch."""
+"""Number of damaged files in each batch."""
 TEXTS = (models.MECHANISM, models.LOOPS, models.SIDES)
 NUMBERS = ("0", "-1", "1e300", "-1e-300", "nan", "inf", "", "abc", "1 2 3 4 5 6 7 8", "99999999999")
 NUMBER = re.compile(r"(?<=[\" ])-?\d*\.?\d+(?=[\" ])")
@@ -25,7 +25,7 @@ ELEMENT = re.compile(r"<[a-z][^<>]*/>")
 
 
 def damage(text: str, draw: random.Random) -> str:
-    """Return the text with one change of a random kind."""
+    """Return the text with one random change."""
     kind = draw.randrange(7)
     if kind == 0:
         return _replace(text, NUMBER, draw, lambda _: draw.choice(NUMBERS))
@@ -40,7 +40,7 @@ def damage(text: str, draw: random.Random) -> str:
     if kind == 5:
         place = draw.randrange(len(text))
         return text[:place] + chr(draw.randrange(32, 0x250)) + text[place + 1 :]
-    # An attribute of another element.
+    # Replace an attribute by that of another element.
     other = draw.choice(ATTRIBUTE.findall(text) or [""])
     return _replace(text, ATTRIBUTE, draw, lambda _: other)
 

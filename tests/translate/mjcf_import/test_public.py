@@ -1,7 +1,7 @@
-"""Public models of MuJoCo, converted and compared in osimlite and in OpenSim at 100 random poses.
+"""Tests of public MuJoCo models, converted and compared in osimlite and in OpenSim at 100 random poses.
 
-The models are not part of the repository. Clone MyoHub/myo_sim as ``myo_sim`` and
-google-deepmind/mujoco as ``mujoco`` into a folder, and name it in OSIMLITE_PUBLIC_MODELS.
+The models are not part of the repository. Clone MyoHub/myo_sim as ``myo_sim`` and google-deepmind/mujoco as ``mujoco``
+into a folder, and name it in OSIMLITE_PUBLIC_MODELS.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ POSES = 100
 
 
 class Case(NamedTuple):
-    """A public model, and how near its paths must be."""
+    """Public model and the tolerances of its paths."""
 
     file: str
     median_length: float  # median over tendons of the root mean square error, m
     worst_length: float  # worst root mean square error of a tendon, m
-    median_force: float = 0.05  # median over muscles, parts of the isometric force
+    median_force: float = 0.05  # median over muscles, relative to the isometric force
 
 
 CASES = {
@@ -51,7 +51,7 @@ CASES = {
 
 @pytest.fixture(scope="module", params=CASES)
 def case(request) -> tuple[Case, Osim]:
-    """A case, and its conversion; the rules of MuJoCo are those of the version that is installed."""
+    """Return a case and its conversion, by the rules of the installed version of MuJoCo."""
     case = CASES[request.param]
     version = int(mujoco.__version__.split(".")[0])
     return case, osimlite.from_mjcf(models.public(case.file), written_for=version)
@@ -80,7 +80,7 @@ def test_every_tendon_and_actuator_is_accounted_for(case):
 
 
 def test_lengths_and_forces_in_osimlite(case):
-    """At poses that decided nothing: other ones than those of the conversion."""
+    """The poses differ from those that the conversion used for its fits."""
     expected, made = case
     source = load_mjcf(models.public(expected.file))
     model = source.model
@@ -133,6 +133,6 @@ def test_bodies_and_lengths_in_opensim(case, tmp_path):
             assert np.abs(rotation - data.xmat[body].reshape(3, 3)).max() < 1e-9
         lengths = paths.lengths(values)
         for name, muscle in muscles.items():
-            # What OpenSim and osimlite make of the paths is the same.
+            # OpenSim and osimlite compute the same lengths.
             theirs = muscle.getPath().getLength(live.state)
             assert theirs == pytest.approx(lengths[f"/forceset/{name}"], rel=0, abs=1e-6), name

@@ -1,4 +1,4 @@
-"""Bodies, joints and inertias of MJCF files in OpenSim."""
+"""Tests of bodies, joints and inertias of MJCF files in OpenSim."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ def test_constraints(tmp_path):
         off = values["jb"] - np.polyval(coupler.coefficients, values["ja"])
         rows = [k for k in range(data.nefc) if data.efc_id[k] == 0]
         assert abs(off - data.efc_pos[rows[0]]) < 1e-12
-        # The weld: three rows of MuJoCo are the distance of the anchors.
+        # The first three rows of MuJoCo's weld are the distance of the anchors.
         weld = next(item for item in made.model.constraint_set.objects if item.name == "weld")
         poses = mechanism.body_transforms(values)
         first, second = weld.frames
@@ -119,7 +119,7 @@ def test_wrong_words_and_files_are_refused(mechanism, tmp_path):
     part = models.write_mjcf(tmp_path, "<mujocoinclude/>", "part.xml")
     with pytest.raises(OsimliteError, match="convert the file that includes it"):
         osimlite.from_mjcf(part)
-    # The line 0 of an element of an included file is no position.
+    # An element of an included file has no line here: no position must appear in the message.
     (tmp_path / "bad.stl").write_bytes(b"solid")
     mesh = '<mujocoinclude><asset><mesh file="bad.stl"/></asset></mujocoinclude>'
     models.write_mjcf(tmp_path, mesh, "mesh.xml")
@@ -156,7 +156,7 @@ AWAKE = """<mujoco>
   </worldbody>
 </mujoco>
 """
-"""A body that is to start asleep beside one that is awake: MuJoCo warns when it poses the model."""
+"""Model with a sleeping body next to an awake one, about which MuJoCo warns when it poses the model."""
 
 
 @pytest.mark.skipif(

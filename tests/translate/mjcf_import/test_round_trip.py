@@ -1,4 +1,4 @@
-"""Models of OpenSim, translated to MJCF and back."""
+"""Tests of OpenSim models that are translated to MJCF and back."""
 
 from __future__ import annotations
 
@@ -19,7 +19,15 @@ LENGTHS = {"gait10dof18musc": 4e-3, "jumper": 1e-3}
 
 
 def there_and_back(model, folder):
-    """Return the model after both translations, and what MuJoCo's joints are at values of coordinates."""
+    """Translate a model to MJCF and back.
+
+    Args:
+        model: OpenSim model.
+        folder: folder of the files.
+
+    Returns:
+        Model after both translations, and a function that returns values of its coordinates for those of the original.
+    """
     translated = osimlite.to_mjcf(model, visuals=False)
     file = translated.write(folder)[0]
     made = osimlite.from_mjcf(file, written_for=4)

@@ -1,4 +1,4 @@
-"""Tendons, muscles and other actuators of MJCF files in OpenSim."""
+"""Tests of tendons, muscles and other actuators of MJCF files in OpenSim."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def test_moment_arms_are_rates_of_tendons(arm, made, records):
     model, data, paths = source.model, mujoco.MjData(source.model), osimlite.paths(made.model)
     owners = {"straight": "m_straight", "over": "m_over", "round": "m_round", "both": "linear"}
     owners |= {"through": "m_through", "pulley": "m_pulley", "elastic": "elastic_spring"}
-    # MuJoCo's lengths are differentiated, because the layout of its Jacobian differs by version.
+    # Differentiate MuJoCo's lengths, because the layout of its Jacobian depends on the version.
     step = 1e-5
     errors = {name: [] for name in owners}
     for pose in sample_qpos(source, 30, 6):
@@ -96,7 +96,7 @@ def test_moment_arms_are_rates_of_tendons(arm, made, records):
                     coordinate.rpartition("/")[2]: value
                     for coordinate, value in arms[f"/forceset/{owner}"].items()
                 }
-                # OpenSim's moment arm is the negative rate of the length.
+                # OpenSim's moment arm is the negative derivative of the length.
                 value = -by_coordinate.get(model.joint(joint).name, 0.0)
                 errors[name].append(value - rates[model.tendon(name).id])
     for name in ("through", "pulley"):
@@ -117,7 +117,7 @@ def test_forces_are_mujocos_in_opensim(arm, tmp_path, muscle_class):
     allowed |= dict.fromkeys(muscles, 1e-11 if muscle_class == "exact" else 4.0)
     if muscle_class == "exact":
         allowed |= {"m_through": 0.02, "m_pulley": 0.5}
-        # OpenSim's way over a cylinder is not quite the shortest.
+        # OpenSim's path over a cylinder is not exactly the shortest.
         allowed |= {"m_over": 0.1}
     if muscle_class == "millard":
         allowed = {name: limit for name, limit in allowed.items() if name in muscles}
@@ -134,7 +134,7 @@ def test_muscles_have_fitted_curves(made, records):
     assert type(muscle).__name__ == "Millard2012EquilibriumMuscle"
     assert muscle.ignore_tendon_compliance and not muscle.ignore_activation_dynamics
     assert (muscle.activation_time_constant, muscle.deactivation_time_constant) == (0.015, 0.06)
-    # What the tendon is shorter than nothing, the fiber is shorter.
+    # The tendon slack length must be positive; the optimal fiber length is reduced by the difference.
     fiber, slack = 0.2 / 0.7, 0.15 - 0.6 * 0.2 / 0.7
     assert slack < 0.0 < muscle.tendon_slack_length == 1e-4
     assert muscle.optimal_fiber_length == pytest.approx(fiber + slack - 1e-4)
@@ -174,14 +174,14 @@ def test_geodesics_are_nearer_than_wrap_objects(arm, up):
     before, wrapped = measure("wraps")
     after, geodesic = measure("geodesics")
     assert "Scholz2015GeometryPath" not in before.values()
-    # In a turned world, the frame of the first points is no body.
+    # After a rotation of the world, the frame of the first points is an offset frame, not a body.
     assert (after["m_over"] == "Scholz2015GeometryPath") == (wrapped > 1e-6)
     assert geodesic <= max(min(wrapped, 1e-6), 0.0)
     assert after["m_through"] == before["m_through"]
 
 
 def test_sites_in_one_place_are_recorded(tmp_path):
-    """OpenSim computes NaN where neighbouring points of two bodies are in one place."""
+    """OpenSim computes NaN where neighbouring points on two bodies coincide."""
     text = """<mujoco><worldbody>
 <body><joint type="hinge" axis="0 1 0"/><geom type="sphere" size=".2" pos="1 0 0"/><site name="inner" pos="1 0 0"/>
 <site name="other" pos="1 0 0"/></body><site name="outer" pos="1 0 0"/></worldbody>
@@ -227,7 +227,7 @@ FLOATING = """<mujoco>
   </actuator>
 </mujoco>
 """
-"""Tendons that move with a free joint alone, so that they have no polynomial of coordinates."""
+"""Tendons that only move with a free joint and therefore have no polynomial of coordinates."""
 
 
 def test_tendons_of_free_bodies_have_paths_without_polynomials(tmp_path):
@@ -240,7 +240,7 @@ def test_tendons_of_free_bodies_have_paths_without_polynomials(tmp_path):
     assert records["/tendon/branched"].done == (
         "a GeometryPath through the sites of the first branch, straight between them"
     )
-    # The record says how far off such paths are.
+    # The record states the errors of such paths.
     assert 0.0 < records["/tendon/within"].errors["length"].max < 0.2
     assert records["/tendon/branched"].errors["length"].max > 0.2
     assert osimlite.read_text(made.text).name == made.model.name
@@ -263,7 +263,7 @@ SEVERAL = """<mujoco>
   </actuator>
 </mujoco>
 """
-"""An actuator with three controls and outputs before one that has one of each."""
+"""Actuator with three controls and outputs, before an actuator with one of each."""
 
 
 @pytest.mark.skipif(VERSION < 4, reason="needs a MuJoCo whose actuators have several controls")
