@@ -155,6 +155,9 @@ def _stop(server: Any, files: list[Any]) -> None:
 def copy_for_orders() -> dict[str, Any]:
     """Fork this process for each order, and return the order in the child that is to run it.
 
+    Returns:
+        Order with the script, its arguments, folder and environment, and whether Python ends as usual.
+
     Raises:
         SystemExit: there are no more orders.
     """

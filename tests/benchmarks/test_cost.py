@@ -12,7 +12,14 @@ from benchmarks.cost import KINDS, Cost, describe_changes
 
 
 def costs(**numbers: int) -> dict[str, Cost]:
-    """Return the cost of one action `walk` with these numbers of calls; `__` in a name stands for `.py: `."""
+    """Return the cost of an action.
+
+    Args:
+        numbers: number of calls of each function, such as `legs__step` for `step` in `legs.py`.
+
+    Returns:
+        Cost of the action `walk`, by action.
+    """
     calls = {name.replace("__", ".py: "): number for name, number in numbers.items()}
     return {"walk": Cost({kind: calls if kind == "calls" else {} for kind in KINDS})}
 

@@ -1,4 +1,4 @@
-"""Models, data and comparisons that several test modules of this package share."""
+"""Models, data and comparisons for the tests of commands."""
 
 from __future__ import annotations
 

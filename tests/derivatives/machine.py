@@ -70,13 +70,13 @@ class Beside:
         return np.array(self.engine.compute_derivative(self.t, y.tolist()))[self.places]
 
     def controls(self, x: np.ndarray) -> list[float]:
-        """What the model's controllers say."""
+        """Return the controls of the model's controllers at a state."""
         self.derivative(x)
         result: list[float] = self.engine.read_controls()
         return result
 
     def xdot(self, x: np.ndarray) -> np.ndarray:
-        """By the function."""
+        """Compute the state derivative by the CasADi function, with the controls of the model's controllers."""
         f = self.functions
         return np.array(f.dynamics(self.t, x, self.controls(x), f.p)).ravel()
 

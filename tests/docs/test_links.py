@@ -11,7 +11,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 MAX_GROUP = 7
-"""Largest number of entries of a group of the navigation, and of links in a cell of the first page."""
+"""Largest number of entries in a group of the navigation, and of links in a cell of the first page."""
 GENERATED = re.compile(
     r"reference/(commands|components)\.md|rules/OSIM\d+\.md|reference/library\.md"
 )

@@ -112,7 +112,15 @@ def cost_of(mechanism: Mechanism, markers: list[MarkerTarget], measured: Any, q:
 
 
 def numbers_of(item: Object, path: str = "") -> dict[str, Any]:
-    """Return all values of an object and of the objects in it, by path."""
+    """List all values of an object and of the objects in it.
+
+    Args:
+        item: the object.
+        path: path of the object, which precedes all keys.
+
+    Returns:
+        Values of properties and names of classes, by path.
+    """
     result: dict[str, Any] = {f"{path}": type(item).__name__}
     for spec in type(item).field_specs().values():
         value = getattr(item, spec.name)

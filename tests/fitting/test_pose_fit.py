@@ -56,7 +56,16 @@ def markers_of(mechanism: Mechanism, rng: np.random.Generator, each: int = 3) ->
 
 
 def derivatives(fit: PoseFit, frame: Any, q: Any) -> tuple[float, Any, Any]:
-    """Return cost, gradient and second derivative at a pose, in the order of the fit's coordinates."""
+    """Evaluate the cost of a fit at a pose.
+
+    Args:
+        fit: the fit.
+        frame: measurements of one frame.
+        q: coordinates of the pose.
+
+    Returns:
+        Cost, gradient (n,) and Hessian (n, n), in the order of the fit's coordinates.
+    """
     system, shape = fit.system, fit.layout
     size = len(fit.order)
     m = pose_record.Fit(

@@ -40,7 +40,7 @@ def reference(fixtures: Path) -> Callable[[str], Table]:
 
 @pytest.fixture(scope="session")
 def simulation(walker: Model) -> Iterator[Any]:
-    """Yield a simulation of the walker by PyBullet, with the default route to accelerations."""
+    """Yield a simulation of the walker by the default engine, which is the compiled one."""
     from osimlite.simulation import Simulation
 
     with Simulation(walker) as ready:

@@ -12,12 +12,15 @@ Faces = list[tuple[int, ...]]
 
 
 def ball(radii: Sequence[float], around: int = 10, along: int = 6) -> tuple[np.ndarray, Faces]:
-    """Return points and faces of a closed ellipsoid of quadrilaterals, with triangles at its poles.
+    """Build a closed ellipsoid of quadrilaterals, with triangles at its poles.
 
     Args:
         radii: half axes (m).
         around: number of faces around the axis.
         along: number of rings of faces from pole to pole.
+
+    Returns:
+        Points (n, 3), and indices of the points of each face.
     """
     rings = [
         (np.sin(a) * np.cos(b), np.sin(a) * np.sin(b), np.cos(a))
@@ -36,7 +39,14 @@ def ball(radii: Sequence[float], around: int = 10, along: int = 6) -> tuple[np.n
 
 
 def block(sizes: Sequence[float]) -> tuple[np.ndarray, Faces]:
-    """Return points and faces of a hexagonal prism, whose hexagons are not divided."""
+    """Build a hexagonal prism, whose two hexagons are single faces.
+
+    Args:
+        sizes: factors of the three axes (m).
+
+    Returns:
+        Points (12, 3), and indices of the points of each face.
+    """
     around = 2.0 * np.pi * np.arange(6) / 6
     ends = [(np.cos(b), np.sin(b), z) for z in (-1.0, 1.0) for b in around]
     sides = [(k, (k + 1) % 6, 6 + (k + 1) % 6, 6 + k) for k in range(6)]

@@ -283,7 +283,15 @@ def add(model: Model, name: str, joint: Any, carrier: Any, at=(0, 0, 0), **more:
 
 
 def pins(count: int, length: float = 0.4) -> tuple[Model, list[Body]]:
-    """Return a chain of pendulums, and its bodies."""
+    """Build a chain of pendulums.
+
+    Args:
+        count: number of pendulums.
+        length: distance of successive joints (m).
+
+    Returns:
+        Model, and its bodies from the root outwards.
+    """
     model = Model(name="pins")
     bodies: list[Body] = []
     for number in range(count):

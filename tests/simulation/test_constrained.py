@@ -1,4 +1,4 @@
-"""Tests of custom joints and constraints: accelerations by Bullet and by the recursion, energy, initial states."""
+"""Tests of custom joints and constraints: accelerations by Bullet against the recursion, energy, initial states."""
 
 from __future__ import annotations
 

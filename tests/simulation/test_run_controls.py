@@ -24,7 +24,7 @@ TIMES, VALUES = (0.0, 0.1, 0.3), (1.0, 3.0, -1.0)
 
 @pytest.fixture(scope="module")
 def model() -> Model:
-    """Return a model with three actuators, the first of which a controller of the model drives."""
+    """Return a model with three actuators; a controller of the model drives the first one."""
     made = arm()
     made.add(
         CoordinateActuator(name="first", coordinate="q0"),

@@ -136,13 +136,16 @@ SETUP = """<OpenSimDocument Version="40600">
 
 
 def tables(folder: Path, model: Model, analyses: str, *, check: bool = True) -> dict[str, StoTable]:
-    """Return the tables of analyses of a slow motion of a model, by name.
+    """Run analyses of a slow motion of a model.
 
     Args:
         folder: folder of the files.
         model: the model.
         analyses: XML of the analyses.
         check: refuse what OpenSim 4.6 refuses; without it, classes that OpenSim 4.6 lacks are accepted.
+
+    Returns:
+        Tables by name.
     """
     osimlite.write(model, folder / "model.osim")
     mechanism = osimlite.mechanism(model)

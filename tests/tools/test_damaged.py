@@ -152,7 +152,7 @@ DAMAGES: tuple[Callable[[str, random.Random], str], ...] = (
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
-    """Return all files of an undamaged trial."""
+    """Return the contents of all files of an undamaged trial, by path."""
     folder = tmp_path_factory.mktemp("whole")
     laid_out(folder)
     return state(folder)

@@ -15,7 +15,7 @@ STEP = 1e-6
 
 
 def records(t: float) -> dict[str, Any]:
-    """Return the record of a muscle of constant width at a time, with arbitrary forces."""
+    """Return the values that the law of a muscle of constant width records at a time, with arbitrary forces."""
     width = 0.02
     along, along_rate = 0.08 + 0.01 * np.sin(3.0 * t), 0.03 * np.cos(3.0 * t)
     fiber = np.hypot(width, along)

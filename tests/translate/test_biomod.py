@@ -46,11 +46,14 @@ def make_tilted() -> osimlite.Model:
 
 
 def find_segments(made: BioMod, values: dict[str, float]) -> dict[str, np.ndarray]:
-    """Return the poses of all segments of a text.
+    """Compute the poses of all segments of a translation.
 
     Args:
         made: translation.
         values: value of each moving segment.
+
+    Returns:
+        Pose (4, 4) in the base by segment.
     """
     poses = {"base": np.eye(4)}
     numbers = iter(values.values())

@@ -60,7 +60,7 @@ def divide_and_round(s: Ints, x: Floats, out: Floats, count: int) -> int:
 
 
 def use_bits(s: Ints, x: Floats, out: Floats, count: int) -> int:
-    """Use bits of integers, of which JavaScript has fewer."""
+    """Use bits of 64-bit integers, which JavaScript's operators do not support."""
     k, m = s[0], s[1]
     out[0], out[1], out[2] = k & m, k | 8, k ^ 3
     out[3], out[4] = k >> 1, k << m
@@ -140,7 +140,7 @@ def choose(s: Ints, x: Floats, out: Floats, count: int) -> int:
 
 # ---------------------------------------------------------------------------------------------------- tuples
 def make_point(size: float, number: int) -> Point:
-    """Return a named tuple from one of two return statements, the second of which uses a default."""
+    """Return a named tuple from one of two return statements; the second one uses a default."""
     if number > 1:
         return Point(size, number, (1, size), 3)
     return Point(size, number, (size, 2.0))
@@ -152,7 +152,7 @@ def sum_items(a: float, b: float, c: float, d: float = 0.25) -> float:
 
 
 def first_two(point: tuple[float, ...], weight: float) -> tuple[float, float]:
-    """Return a tuple that is computed from the beginning of another one."""
+    """Return the first two items of a tuple, times a weight."""
     return weight * point[0], weight * point[1]
 
 

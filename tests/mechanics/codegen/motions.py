@@ -100,7 +100,12 @@ def differentiate(model: Any) -> str:
 def collect(action: Any, count: int) -> dict[str, str]:
     """Return the digests of `count` models, and of half as many from the shared folder.
 
-    Models that raise an error are left out.
+    Args:
+        action: function that computes the digest of a model.
+        count: number of models, without those of the shared folder.
+
+    Returns:
+        Digests by name of the model; models that raise an error are left out.
     """
     found: dict[str, str] = {}
     for models, limit in ((list_models(), count), (list_shared_models(), count + count // 2)):

@@ -101,6 +101,9 @@ def make_arguments(symbol: str, seed: int, hard: float) -> tuple[array[int], arr
         symbol: name of the kernel.
         seed: seed of the random numbers.
         hard: fraction of the floats that are special, such as zeros, infinity or NaN.
+
+    Returns:
+        Integers and floats, each a vector of SIZE numbers.
     """
     rng = random.Random(seed)
     floats = (

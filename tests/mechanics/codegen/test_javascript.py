@@ -61,7 +61,7 @@ def spread(new: float, case: float) -> float:
 
 
 def pointers(v: np.ndarray, count: int) -> float:
-    """Use offsets in vectors."""
+    """Read and write items of a vector through an offset."""
     numbers = at(v, 1)
     numbers[count], numbers[0] = numbers[0] + 7.0, numbers[count]
     numbers[1] -= 1.5

@@ -101,7 +101,7 @@ MATERIAL = 1e6, 1.0, 0.8, 0.4, 0.4
 
 
 def plane_contacts(positions, separating, names):
-    """Return contacts of spheres 1 cm deep in the plane y = 0, some of which separate at 1 m/s.
+    """Return contacts of spheres 1 cm deep in the plane y = 0; selected spheres separate at 1 m/s.
 
     Args:
         positions: x of each sphere (m).

@@ -67,7 +67,7 @@ def _radii(rng: np.random.Generator) -> Array:
 
 
 def motions_of(joint_type: str, rng: np.random.Generator) -> tuple[JointMotion, ...]:
-    """Return the motions of a joint type with random properties."""
+    """Return the motions of a joint with random properties, from its parent frame to its child frame."""
     if joint_type == "EllipsoidJoint":
         return make_ellipsoid_motions(_radii(rng))
     if joint_type == "ConstantCurvatureJoint":

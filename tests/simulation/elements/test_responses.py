@@ -122,7 +122,15 @@ def _noted(given: dict[str, Any], kind: Any, *own: Any) -> Any:
 
 
 def responses(system: System, y: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the response derivatives of each force, by the name of the kernel that computes them."""
+    """Compute the derivatives of all forces at a state.
+
+    Args:
+        system: the system, after the evaluation of the state.
+        y: the state.
+
+    Returns:
+        Workspace of derivatives by the name of the kernel that computes them.
+    """
     s, result = system.program.ints, {}
     for place, name in system.program.responses.items():
         kernel = system.program.code.bind_entry(

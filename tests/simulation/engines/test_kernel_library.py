@@ -94,7 +94,7 @@ def test_the_next_process_computes_no_digest_again(library, tmp_path, monkeypatc
     monkeypatch.setattr(KernelLibrary, "has_changed", fail)
     later = KernelLibrary(library.path)
     assert (later.changed_files, later.get_address("evaluate")) == (edited.changed_files, address)
-    # Another edit invalidates all cached results.
+    # After another edit, the digests are computed again.
     with pytest.raises(AssertionError, match="computed again"):
         assert edit(library, tmp_path / "mechanics/kernels/dynamics.py").changed_files
 

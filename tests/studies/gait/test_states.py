@@ -55,7 +55,7 @@ def test_a_walker_that_counts_energy_walks_as_before():
 
 
 def test_states_that_push_are_exchanged_by_what_they_do():
-    """Each leg has two similar states, only one of which has an effect; a fifth state belongs to neither leg."""
+    """Two of four similar states act on one leg each, and are exchanged; a fifth state acts on both legs."""
     drive = np.array([0.3, 0.3, 0.3, 0.3, 0.7])
 
     def derivative(t, y):

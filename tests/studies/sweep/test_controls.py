@@ -34,7 +34,7 @@ def ends(model, initial=None, **controls):
 
 
 def runs(model, vary, *rows, **choices):
-    """Run samples of which only numbers differ from the compiled model.
+    """Run samples that differ from the compiled model in numbers only.
 
     Args:
         model: the model.

@@ -40,7 +40,11 @@ def compare_errors(folder: Path) -> tuple[np.ndarray, list[tuple[float, float]]]
 
 
 def check_errors(folder: Path) -> tuple[float, float]:
-    """Return root mean square and largest marker error (cm) of a checked trial."""
+    """Check a trial.
+
+    Returns:
+        Root mean square and largest marker error (cm) that the check reports.
+    """
     verdicts = [
         verdict
         for verdict in osimlite.check_trial(folder).verdicts
@@ -56,7 +60,11 @@ def expect_close(numbers: tuple[float, float], expected: tuple[float, float]) ->
 
 
 def reduce(errors: np.ndarray) -> tuple[float, float]:
-    """Return root mean square and largest value of the errors that are not NaN."""
+    """Summarize errors, leaving out NaN.
+
+    Returns:
+        Root mean square and largest value.
+    """
     return float(np.sqrt(np.nanmean(errors**2))), float(np.nanmax(errors))
 
 

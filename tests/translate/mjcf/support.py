@@ -76,7 +76,11 @@ def on_a_function(function, *, range=(-1.0, 2.0), name="tx") -> Model:
 
 
 def equalities(compiled: Compiled) -> dict[str, tuple[str | None, np.ndarray]]:
-    """Return leader and polynomial of every dependent joint in MuJoCo."""
+    """Read the equality constraints between joints in MuJoCo.
+
+    Returns:
+        Leader (None for a constant) and five coefficients of the polynomial, by dependent joint.
+    """
     model, result = compiled.model, {}
     for k in range(model.neq):
         if model.eq_type[k] == mujoco.mjtEq.mjEQ_JOINT:
@@ -89,7 +93,15 @@ def equalities(compiled: Compiled) -> dict[str, tuple[str | None, np.ndarray]]:
 
 
 def off(compiled: Compiled, q: np.ndarray) -> dict[str, float]:
-    """Return the error of each dependent joint, with all other joints at their values in the model."""
+    """Evaluate the polynomials of dependent joints.
+
+    Args:
+        compiled: compiled translation.
+        q: coordinates.
+
+    Returns:
+        Difference from the exact value (rad or m) by joint, with the leader at its exact value.
+    """
     values = compiled.mjcf.joint_values(q)
     return {
         name: float(np.polynomial.polynomial.polyval(values[leader] if leader else 0.0, polynomial))

@@ -45,7 +45,7 @@ def settled(model, seconds: float = 0.2) -> tuple[Compiled, np.ndarray]:
 
 
 def on(frame: str, *point: float) -> tuple[float, ...]:
-    """Return the position of a body's point in ground, in a pose near the default pose."""
+    """Return the position (m) in ground of a point of a body, in a pose near the default pose."""
     mechanism = osimlite.mechanism(chain())
     return tuple(mechanism.station_position(frame, point, mechanism.values({}) + 0.05).tolist())
 

@@ -163,7 +163,11 @@ class LiveModel:
         self.model.realizePosition(self.state)
 
     def body(self, name: str) -> tuple[Array, Array]:
-        """Return position (3,) and rotation (3, 3) of a body in ground."""
+        """Find the pose of a body in ground.
+
+        Returns:
+            Position (3,) and rotation matrix (3, 3).
+        """
         pose = self.model.getBodySet().get(name).getTransformInGround(self.state)
         position = pose.p()
         rotation = pose.R()

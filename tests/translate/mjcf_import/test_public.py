@@ -51,7 +51,11 @@ CASES = {
 
 @pytest.fixture(scope="module", params=CASES)
 def case(request) -> tuple[Case, Osim]:
-    """Return a case and its conversion, by the rules of the installed version of MuJoCo."""
+    """Convert a public model by the rules of the installed version of MuJoCo.
+
+    Returns:
+        Case with the tolerances, and the conversion.
+    """
     case = CASES[request.param]
     version = int(mujoco.__version__.split(".")[0])
     return case, osimlite.from_mjcf(models.public(case.file), written_for=version)
