@@ -25,6 +25,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 SHARED = Path(os.environ.get("OSIMLITE_SHARED", ROOT.parent / "shared"))
+# Packages that must be absent: with one of them, the checks would not test the base dependencies alone.
 OPTIONAL_PACKAGES = (
     "numpy",
     "scipy",
@@ -40,6 +41,7 @@ OPTIONAL_PACKAGES = (
 PROJECTS = ("pipelines/pendulum", "pipelines/walking", "setups", "documents")
 """Folders of fixtures that are checked as complete projects."""
 
+# Fewer models or projects mean that a folder is missing, and that the checks would pass without a test.
 MIN_MODELS, MIN_PROJECTS = 12, 3
 NOTE = "did not run: they need osimlite[sim]"
 """Sentence in reports about rules that need numerical packages."""

@@ -44,6 +44,7 @@ def run_opensim(setup: Path, results: Path) -> tuple[bool, str]:
     return "run: True" in log, log
 
 
+# Script that runs a setup by OpenSim, with a limit of 60 s of processor time.
 _RUN = """
 import re, resource, sys, opensim
 resource.setrlimit(resource.RLIMIT_CPU, (60, 60))

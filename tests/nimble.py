@@ -17,6 +17,7 @@ import pytest
 
 VARIABLE = "OSIMLITE_NIMBLE"
 
+# Script that calls one of its functions with arguments from standard input, and prints the result as JSON.
 SCRIPT = """
 import json, os, sys
 import numpy as np

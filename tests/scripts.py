@@ -33,6 +33,7 @@ from tests.leaving import leave
 from tests.suite import is_full
 
 ROOT = Path(__file__).resolve().parent.parent
+# Modules that scripts need, for `modules` of `run_script`.
 OPENSIM = ("opensim",)
 CASADI = ("casadi", "osimlite.moco", "osimlite.optimal.program")
 QUIET = ("-W", "ignore")

@@ -23,7 +23,9 @@ from typing import Any
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
+# Name of the plugin by which pytest in the server is recognized.
 _SERVER = "osimlite-check-server"
+# Key of the distribution mode in the input of a worker of pytest-xdist.
 _DIST = "osimlite-dist"
 
 

@@ -19,6 +19,7 @@ from tests.simple_models import make_marked_body
 MARKERS = ("one", "two", "three", "four")
 
 
+# Positions of the markers on the body (m).
 POINTS = np.array(((0.1, 0.0, 0.0), (0.0, 0.2, 0.0), (0.0, 0.0, 0.3), (0.1, 0.1, 0.1)))
 
 
@@ -33,6 +34,7 @@ def positions(values: Any) -> Any:
     return np.array([[mechanism.at(q).point(0, point) for point in POINTS] for q in values])
 
 
+# Scale factor of each segment of the simulated person.
 SIZES = {
     "Pelvis": 1.06,
     "RightThigh": 1.12,
@@ -42,12 +44,15 @@ SIZES = {
 }
 
 
+# Positions of markers on bony landmarks of a segment (m), which a fit may hold fixed.
 BONES = {"lateral": (0.0, -0.15, 0.05), "medial": (0.0, -0.15, -0.05)}
 
 
+# Nominal positions of the other markers of a segment (m); on a person they are displaced.
 CLUSTER = {"upper": (0.05, 0.02, 0.02), "front": (0.08, -0.1, 0.0), "back": (-0.07, -0.05, 0.03)}
 
 
+# Markers that fits hold fixed on their segments.
 HELD = tuple(f"{body}_{name}" for body in SIZES for name in BONES)
 
 
@@ -160,12 +165,15 @@ def assert_same(ours: Object, theirs: Object, but: str = "/socket_frame") -> Non
             assert one[place] == value, place
 
 
+# Coordinates of the root joint, in the order of its axes.
 NAMES = ("pelvis_tilt", "pelvis_list", "pelvis_rotation", "pelvis_tx", "pelvis_ty", "pelvis_tz")
 
 
+# Rotation axes of the root joint, as in OpenSim's gait models: z, x, y.
 AXES = ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
 
 
+# Positions of the markers on each body (m).
 PLACES = ((0.05, 0.05, 0.13), (0.05, 0.05, -0.13), (-0.12, 0.04, 0.0), (0.02, 0.4, 0.03))
 
 

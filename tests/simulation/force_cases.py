@@ -116,6 +116,7 @@ def around(path, *surfaces) -> GeometryPath:
     return path
 
 
+# Obstacles of the path over surfaces, on different bodies.
 OBSTACLES = (
     ContactSphere(name="o0", socket_frame="/bodyset/b0", radius=0.05, location=(0.1, -0.1, 0.1)),
     ContactCylinder(name="o1", socket_frame="/bodyset/b1", radius=0.02, location=(0.3, 0.0, 0.1)),
@@ -203,6 +204,7 @@ def pushed(**more):
     return force
 
 
+# Functions of a FunctionBasedBushingForce, of different classes.
 SHAPES = {
     "m_x_theta_x_function": SimmSpline(
         x=(-2.0, -0.5, 0.1, 0.6, 2.0), y=(-30.0, -3.0, 0.0, 6.0, 50.0)
@@ -217,10 +219,12 @@ SHAPES = {
 }
 DAMPED = {"rotational_damping": (0.1, 0.2, 0.3), "translational_damping": (0.4, 0.5, 0.6)}
 SPRING: dict[str, Any] = {"resting_length": 0.4, "stiffness": 50.0, "dissipation": 0.2}
+# Formulas of expression-based forces, with the functions of their grammar.
 FORMULA = "3*q^2 - w*exp(-q/2) + max(qdot, -1)*step(q); w = sin(v)*abs(qdot); v = 1 + q*q"
 ALL = "sqrt(abs(d)) + log(1+d*d) - sin(d)*cos(d)/sec(d) + csc(1+d*d) + tan(d/3) - cot(1+d*d) + asin(d/9) + acos(d/9)"
 MORE = "atan(d) + sinh(d/4) + cosh(d/4) - tanh(d) + erf(d) + erfc(d) + delta(d) + square(d) - cube(d) + recip(2+d*d)"
 
+# Functions that return the components of each case: a force named "a", with its controllers and surfaces.
 FORCES = {
     "limit": lambda: CoordinateLimitForce(
         name="a",

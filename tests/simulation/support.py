@@ -108,12 +108,14 @@ def over(hint=(nan, nan, nan)):
     )
 
 
+# Ends of the cable.
 LEFT, RIGHT = point("/ground", -0.3, 0.01, 0), point("/bodyset/b", 0, 0.01, 0)
 
 
 AXES = ((1, 0.2, 0), (0, 1, -0.5), (0, 0, -1), (-1, 0, 0), (0, -1, 0), (0.3, 0.4, 0.8))
 
 
+# Abscissae and ordinates of the splines below.
 KNOTS = (-1.5, -0.4, 0.1, 0.8, 1.6)
 
 
@@ -388,6 +390,7 @@ def half_locked() -> Model:
     return model
 
 
+# Functions that return models with constraints, by name.
 MODELS = {make.__name__: make for make in (four_bars, patella, rod, bead, welded, half_locked)}
 
 
@@ -445,6 +448,7 @@ def thrown(folder, *, dissipation=0.0, friction=0.0) -> Model:
     return model
 
 
+# Names of the dimensions of each type of wrap object.
 SIZES = {kind.removeprefix("Wrap"): names for kind, (*_, names) in LAWS.items()}
 
 

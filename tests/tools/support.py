@@ -13,6 +13,7 @@ from osimlite.io.tables.writers import write_trc
 from osimlite.schema.model import Model
 from tests.fitting.support import MARKERS, free_body, positions
 
+# Setups in the folder of the trial; the model is in its parent folder.
 ANALYZE = """<OpenSimDocument Version="40600"><AnalyzeTool name="an">
 <model_file>../model.osim</model_file><results_directory>analyzed</results_directory>
 <initial_time>0.1</initial_time><final_time>0.6</final_time>

@@ -15,6 +15,7 @@ import pytest
 
 from osimlite.mechanics.codegen.cplusplus import HEADER, header_text
 
+# Command of the compiler; None if there is none.
 COMPILER = os.environ.get("CXX") or next(
     filter(None, map(shutil.which, ("clang++", "g++", "c++"))), None
 )

@@ -21,6 +21,7 @@ from osimlite.simulation.elements.laws import find_law, get_symbol, list_library
 
 SIZE = 160
 """Length of each vector."""
+# Floats for which functions have corners, overflow, underflow or no result.
 SPECIAL = math.nan, math.inf, -math.inf, 0.0, -0.0, 1.0, -1.0, 1e-300, 1e300, -1e300, 5e-324
 
 

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 
+# Constants in random expressions.
 FLOATS = "0.5", "-1.25", "2.0", "1e-3", "7.75", "0.0", "-0.5", "3.0", "1e3"
 DEPTH = 3
 """Largest depth of expressions."""

@@ -1,4 +1,4 @@
-"""Tests of couplings by linear functions, which become mimic joints."""
+"""Tests of the detection of functions that are straight lines, by which a joint of a robot can mimic another."""
 
 from __future__ import annotations
 

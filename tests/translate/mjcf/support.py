@@ -133,6 +133,7 @@ def coupled(function) -> Model:
     return model
 
 
+# Bodies that constraints and forces of the tests connect.
 A, B = "/bodyset/b1", "/bodyset/b3"
 
 
@@ -165,6 +166,7 @@ def chain(*forces) -> Model:
     return model
 
 
+# Names that are reserved, equal after cleaning, invalid in XML, or similar to names that the export adds.
 HOSTILE = (
     "", "world", "ground", "World", "a", "A", " a", "a ", "a\tb", "a\nb", "a\r\nb", "a b", "a  b", "a/b", "a.b", "/a",
     ".", "..", "a\x0bb", "a\x00b", "a\ud800", "\ufffe", 'a"b', "a'b", "<a>", "&amp;", "&#10;", "é", "e\u0301", "\u00a0",

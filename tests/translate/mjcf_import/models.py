@@ -10,6 +10,7 @@ import pytest
 PUBLIC = Path(os.environ.get("OSIMLITE_PUBLIC_MODELS", "/nonexistent"))
 """Folder with clones of public repositories: ``myo_sim`` (MyoHub/myo_sim), ``mujoco`` (google-deepmind/mujoco)."""
 
+# Model with joints of all types, springs, dampers and armature.
 MECHANISM = """
 <mujoco model="mechanism">
   <compiler angle="radian"/>
@@ -50,6 +51,7 @@ MECHANISM = """
 </mujoco>
 """
 
+# Model with equality constraints.
 LOOPS = """
 <mujoco model="loops">
   <compiler angle="radian"/>
@@ -89,6 +91,7 @@ def public(name: str) -> Path:
     return path
 
 
+# Model with tendons, muscles and other actuators.
 ARM = """
 <mujoco model="arm">
   <compiler angle="radian"/>
@@ -154,6 +157,7 @@ ARM = """
 """
 
 
+# Model with tendons around geoms with side sites.
 SIDES = """
 <mujoco>
   <compiler angle="radian"/>
