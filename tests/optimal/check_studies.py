@@ -134,7 +134,7 @@ def test_the_file_comes_back_and_starts_another_search(tmp_path, solved):
 
 
 def test_implicit_tendons(tmp_path):
-    """Compare Moco's hanging muscle: its solution fulfils the tendon equilibrium here, and ours costs no more."""
+    """Compare Moco's hanging muscle: its solution fulfils the tendon equilibrium here, and that of osimlite costs no more."""
 
     def hanging():
         given = study(tmp_path, "hanging-25")

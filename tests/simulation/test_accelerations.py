@@ -109,7 +109,7 @@ def test_force_records(fixtures, cases):
             assert [row[label] for label in labels] == pytest.approx(expected, rel=1e-9, abs=1e-9)
 
 
-# ------------------------------------------------------------------------------------- joints of every kind
+# ------------------------------------------------------------------------------------------ all joint types
 def chain(*joint_types, spheres=(), inertia=(0.02, 0.03, 0.025, 0.001, -0.002, 0.003)):
     """Return bodies in a chain, each on a joint of another type, over a tilted half space in ground."""
     model = Model(name="chain")
@@ -246,7 +246,7 @@ def test_long_chains_by_both_routes(seed, lengths):
     assert within(result[0], result[1], 1e-8)
 
 
-# ------------------------------------------------------------------------------------------ what is refused
+# --------------------------------------------------------------------------------------------------- errors
 def test_wholly_locked_mechanism_stands_still():
     model = chain("PinJoint")
     next(iter(model.components(Coordinate))).locked = True

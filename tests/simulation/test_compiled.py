@@ -57,7 +57,7 @@ def state_of(mechanism, seed):
     return q, u
 
 
-# ------------------------------------------------------------------------------------- joints of every kind
+# ------------------------------------------------------------------------------------------ all joint types
 
 
 def check(mechanism, seeds=3):
@@ -298,7 +298,7 @@ def test_fixed_steps(fast, simulation):
     assert np.abs(ours.values - theirs.values).max() < 1e-6
 
 
-# --------------------------------------------------------------------------------------------- what is refused
+# ------------------------------------------------------------------------------------------------------ errors
 def test_wholly_locked_mechanism_stands_still(walker):
     mechanism = tree(["PinJoint"], locked=(0,))
     engine = CompiledEngine(mechanism, Forces(()))

@@ -213,7 +213,7 @@ def test_kernels_are_what_they_mean_in_python(make: Any):
     assert y[: len(y) // 2].tolist() == ends.states[0][: len(y) // 2].tolist()
 
 
-# ------------------------------------------------------------------------------------------------- many at once
+# ------------------------------------------------------------------------------------------------------ batches
 @pytest.fixture(scope="module")
 def loop() -> Any:
     """Yield a simulation of four bars with a stop on the first joint."""
@@ -294,7 +294,7 @@ def test_starts_from_which_nothing_holds_fail(loop: Any):
     assert [ENDINGS[int(ending)] for ending in runs.endings] == ["done", "failed", "done"]
 
 
-# ---------------------------------------------------------------------------------------------------- refusals
+# ------------------------------------------------------------------------------------------------------ errors
 def test_a_massless_body_may_hang_on_a_constraint():
     from osimlite import Body
 

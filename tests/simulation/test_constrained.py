@@ -103,7 +103,7 @@ def test_routes_that_are_none_are_refused():
         accelerations(mechanism, np.zeros(4), np.zeros(4), route="articulated-body")
 
 
-# --------------------------------------------------------------------------------------------------- whole models
+# ------------------------------------------------------------------------------------------------ complete models
 
 
 @pytest.mark.parametrize("make", MODELS.values(), ids=MODELS)
@@ -193,7 +193,7 @@ def test_a_ball_rolls_down_a_slope_as_it_should(slope: float):
     assert simulate(model, 0.1).summary["constraints"] == []
 
 
-# ------------------------------------------------------------------------------------------------------- starts
+# ----------------------------------------------------------------------------------------------- initial states
 def test_what_is_set_stays_and_the_rest_follows():
     trajectory = simulate(four_bars(), 0.01, initial={"p1": -0.5}, initial_speeds={"p2": 1.5})
     assert trajectory.values[0, 1] == -0.5

@@ -171,7 +171,7 @@ def rates_at(system: System, y: Any) -> Any:
     return np.array(system.get_derivative())
 
 
-# ------------------------------------------------------------------------------------------------------------- order
+# ---------------------------------------------------------------------------------------------- order of convergence
 @pytest.mark.parametrize(("method", "order"), [("adams", 7), ("bdf", 5), ("rosenbrock", 2)])
 def test_steps_grow_with_the_accuracy_as_the_order_says(method, order):
     """The estimated error is of order h^(k + 1) in a formula of order k, and h^k in the embedded one of order k - 1.
@@ -288,7 +288,7 @@ def test_contacts_begin_and_end(walker, method):
     )
 
 
-# ------------------------------------------------------------------------------------------------------- many in a call
+# -------------------------------------------------------------------------------------------------- many steps per call
 @pytest.mark.parametrize("method", METHODS)
 def test_steps_do_not_depend_on_how_many_are_taken_in_a_call(walker, method, monkeypatch):
     with Simulation(walker, "compiled", integrator=method) as simulation:

@@ -22,7 +22,7 @@ from tests.simulation.equations import (
     runge_kutta_merson,
 )
 
-# ------------------------------------------------------------------------------------------------- Merson's method
+# ------------------------------------------------------------------------------------- Runge-Kutta-Merson's method
 
 
 def fixed_steps(f, y, until, n):
@@ -204,7 +204,7 @@ def test_counts():
     assert integrator.evaluations < together.calls < f.calls
 
 
-# -------------------------------------------------------------------------------------------------------- refusals
+# ---------------------------------------------------------------------------------------------------------- errors
 
 
 def test_a_derivative_that_is_no_number_at_the_start():

@@ -44,7 +44,7 @@ def pendulum():
     )
 
 
-# ---------------------------------------------------------------------------------------------- the start
+# ----------------------------------------------------------------------------------------- initial states
 def test_defaults_and_what_is_set(walker):
     trajectory = osimlite.simulate(
         walker, to=0.01, initial={"RHip_rz": 0.1}, initial_speeds={"LKnee_rz": -2.0}
@@ -262,7 +262,7 @@ def test_one_simulation_runs_many_times(pendulum):
         assert np.array_equal(simulation.run(0.5).values, first.values)
 
 
-# --------------------------------------------------------------------------------------------- known motion
+# ----------------------------------------------------------------------------- motions with known solutions
 def test_energy_of_a_pendulum_is_kept(pendulum):
     energy = osimlite.simulate(pendulum, to=5.0, accuracy=1e-9).energy
     assert energy["total"] == pytest.approx(np.full(501, energy["total"][0]), abs=1e-6)

@@ -29,7 +29,7 @@ from tests.translate.evaluator import Reader
 from tests.translate.support import kinds, one_body, unaccounted, vertices, visuals
 
 
-# ------------------------------------------------------------------------------------------------------ the account
+# ------------------------------------------------------------------------------------------------ records of losses
 def test_every_component_of_the_walker_is_accounted_for():
     model = dynamic_walker()
     urdf = to_urdf(model)
@@ -139,7 +139,7 @@ def test_impossible_inertia_and_names_and_frames_are_told():
     assert unaccounted(model, urdf) == []
 
 
-# ------------------------------------------------------------------------------------------------------ the pictures
+# ----------------------------------------------------------------------------------------------------- visual shapes
 def test_primitives_keep_their_size_place_and_colour():
     red = Appearance(color=(0.8, 0.1, 0.1), opacity=0.5)
     urdf = to_urdf(
@@ -257,7 +257,7 @@ def test_mesh_files_come_along(tmp_path):
     assert urdf.files["meshes/bone.stl"] == binary
 
 
-# ------------------------------------------------------------------------------------------------------ the files
+# ---------------------------------------------------------------------------------------------------------- files
 def test_all_files_are_written_and_bullet_reads_them(tmp_path):
     urdf = osimlite.to_urdf(dynamic_walker())
     written = urdf.write(tmp_path / "out")

@@ -59,7 +59,7 @@ def load(urdf: Urdf, file: str):
     return mesh
 
 
-# ------------------------------------------------------------------------------------------------ what they become
+# ------------------------------------------------------------------------------------------------------ conversion
 def test_vtk_surfaces_become_obj_files_that_others_read_alike(bones):
     """Compare volume, colour and size in trimesh, Bullet and MuJoCo."""
     red = Appearance(color=(0.8, 0.1, 0.1), opacity=0.5)
@@ -152,7 +152,7 @@ def test_only_what_was_read_is_written(bones):
     assert load(urdf, "meshes/rib.obj").volume == pytest.approx(1 / 6)
 
 
-# ------------------------------------------------------------------------------------------------ where they are
+# ---------------------------------------------------------------------------------------------- search for files
 def test_files_outside_the_folders_are_refused_by_name(bones):
     (bones / "model").mkdir()
     (bones / "model" / "own.obj").symlink_to(bones / "rib.obj")

@@ -67,7 +67,7 @@ def sidecar(robot) -> Reader:
     return Reader(urdf_text(robot), format_coordinates(robot, "robot.urdf"))
 
 
-# --------------------------------------------------------------------------------------------------- whole models
+# ------------------------------------------------------------------------------------------------ complete models
 @given(cases(), st.booleans())
 def test_urdf_and_coordinates_say_where_bodies_are(case: Case, merge: bool):
     robot = build_robot(case.mechanism)

@@ -300,7 +300,7 @@ def specialise(s: Ints, x: Floats, out: Floats, count: int) -> int:
     return half_or_none(s[1])  # type: ignore[return-value]
 
 
-# ----------------------------------------------------------------------------------------------------- order
+# --------------------------------------------------------------------------------------- order of evaluation
 def push(v: Floats, k: int) -> float:
     """Count in v[0], and return the count times k."""
     v[0] += 1.0

@@ -101,7 +101,7 @@ def test_division_by_zero_ends_nothing(tmp_path):
     )
 
 
-# ------------------------------------------------------------------------------------------------------ text
+# ----------------------------------------------------------------------------------- text of the translation
 def branch(a: float, b: float) -> float:
     """Return the larger of two numbers, plus 3."""
     # This comment must not appear in the code.

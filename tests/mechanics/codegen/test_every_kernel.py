@@ -187,7 +187,7 @@ def test_functions_have_no_undefined_behaviour(wrapped, text, tmp_path, name):
     assert int(calls) == CALLS // 4 * len(wrapped)
 
 
-# ---------------------------------------------------------------------------------------------- whole models
+# ------------------------------------------------------------------------------------------- complete models
 @pytest.fixture(scope="module")
 def kernels(tmp_path_factory):
     """Translate all kernels, for floats and for numbers with derivatives.

@@ -25,7 +25,7 @@ from osimlite.mechanics.laws.hunt_crossley import (
 from osimlite.mechanics.laws.vectors import ZERO
 from tests.mechanics.laws.contact_sets import contact_forces, simbody_pair_order
 
-# --------------------------------------------------------------------------------------- the table of OpenSim
+# -------------------------------------------------------------------------------------------- OpenSim's table
 
 
 def body_fixed_xyz(angles):

@@ -50,7 +50,7 @@ def _close(found, expected, tolerance=1e-12):
     assert np.abs(found - expected).max() < tolerance * scale
 
 
-# ------------------------------------------------------------------------------------- the walker, end to end
+# ---------------------------------------------------------------------------------------- the complete walker
 def test_the_walker_is_read_as_opensim_reads_it(walker):
     assert list(walker.coordinate_names) == WALKER["coordinates"]
     assert walker.total_mass == 6.0
@@ -283,7 +283,7 @@ def test_a_frame_is_laid_through_stations():
     assert matrix[:3, 3].tolist() == [0.1, 0.2, 0.3]
 
 
-# ------------------------------------------------------------------------------------------ what is refused
+# --------------------------------------------------------------------------------------------------- errors
 def _pendulum() -> tuple[Model, Body, Joint]:
     model = Model(name="m")
     body = _body(model, "rod")

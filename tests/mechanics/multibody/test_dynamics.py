@@ -32,7 +32,7 @@ def _close(found, expected, tolerance):
     assert np.abs(np.asarray(found) - expected).max(initial=0.0) < tolerance * scale
 
 
-# ------------------------------------------------------------------------- every joint type, against OpenSim
+# -------------------------------------------------------------------------- all joint types, against OpenSim
 @pytest.mark.parametrize("case", MIXED["cases"], ids=range(len(MIXED["cases"])))
 def test_the_mixed_tree_moves_as_in_opensim(case):
     mechanism, q, u = mixed_tree(), case["q"], case["u"]
@@ -69,7 +69,7 @@ def test_the_mixed_tree_lists_its_coordinates_as_opensim():
     assert mixed_tree().total_mass == pytest.approx(MIXED["total_mass"], rel=1e-14)
 
 
-# ------------------------------------------------------------------------------------- laws, for random trees
+# ------------------------------------------------------------------------ laws of mechanics, for random trees
 @given(cases())
 def test_the_mass_matrix_is_that_of_the_kinetic_energy(case: Case):
     mechanism, q, u = case.mechanism, case.q, case.u
@@ -163,7 +163,7 @@ def test_momentum_is_mass_times_velocity_of_the_mass_centre(case: Case):
     _close(angular, expected, 1e-11)
 
 
-# ------------------------------------------------------------------------------------- what cannot be solved
+# ------------------------------------------------------------------------------------- unsolvable mechanisms
 def _pendulum(**mass_properties) -> Mechanism:
     properties = MassProperties(**({"mass": 1.0} | mass_properties))
     mobilizer = Mobilizer("/jointset/j", "PinJoint", MOTIONS["PinJoint"], (0,))

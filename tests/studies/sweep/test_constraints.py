@@ -1,4 +1,4 @@
-"""Tests of sweeps with constraints: varied values are kept, others follow, impossible samples fail with a reason."""
+"""Tests of sweeps with constraints: varied values hold, others follow, impossible samples fail with a reason."""
 
 from __future__ import annotations
 

@@ -55,7 +55,7 @@ def test_both_versions_of_mujoco_have_the_same_bodies(older, corpus, tmp_path):
         np.testing.assert_allclose(here, there, rtol=0.0, atol=1e-12)
 
 
-# ------------------------------------------------------------------------------------------------------ the account
+# ------------------------------------------------------------------------------------------------ records of losses
 def test_every_component_of_the_walker_is_accounted_for():
     model = dynamic_walker()
     mjcf = to_mjcf(model)
@@ -137,7 +137,7 @@ def test_files_are_written_and_meshes_come_along(tmp_path, fixtures):
     assert plain.files == {} and "<geom" not in plain.text
 
 
-# ------------------------------------------------------------------------------------------- what would not compile
+# ---------------------------------------------------------------------------------- models that MuJoCo would reject
 def test_what_mujoco_would_refuse_is_told_and_mended():
     model = Model(name="odd")
     below = model.ground
