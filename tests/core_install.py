@@ -5,7 +5,7 @@ Run it with the Python of an environment into which only the wheel is installed:
     ENVIRONMENT/bin/python tests/core_install.py [--models FOLDER] [--all]
 
 It needs no pytest and prints a table of commands by exit codes. It exits with 1 if a command fails, prints a traceback,
-or asks for a package that it should not need.
+or requires a package that it should not need.
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ STATES = [
 
 
 def damped() -> Model:
-    """Return two pendulums on a slide between bushings, with stops, and a locked coordinate with a stop."""
+    """Return a slide and three pins in a chain, one pin locked, with two bushings and a limit for each pin."""
     model = Model(name="damped")
     below = model.ground
     for number, kind in enumerate((SliderJoint, PinJoint, PinJoint, PinJoint)):

@@ -78,7 +78,7 @@ def test_simbodys_early_return_behind_its_switch(positions, speeds, early_return
 
 
 def test_spheres_of_one_force_push_each_other():
-    """The forces are equal and opposite along the line of the centres, and follow from the overlap."""
+    """The forces are equal and opposite, along the line of the centres."""
     mechanism, forces = sled((0.0, 0.06), early_return=False)
     (element,) = forces.elements
     assert len(element.pairs) == 3

@@ -93,7 +93,7 @@ def test_what_is_no_question_is_a_bad_request(server, body):
 
 @pytest.mark.parametrize("number", ["NaN", "Infinity", "-Infinity", "1e308", "-1e300", "1e999"])
 def test_numbers_that_no_pose_has(server, number):
-    """The answer is always valid JSON, which has neither NaN nor infinity."""
+    """JSON has neither NaN nor infinity, so the answer is an error or finite numbers."""
     status, result = asked(server, f'{{"values": [{", ".join([number] * 8)}]}}'.encode())
     assert status == 200
     assert "error" in result or all(value == value for value in result["values"])

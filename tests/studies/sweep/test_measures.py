@@ -141,7 +141,7 @@ def test_functions_of_ones_own(walker, tmp_path, monkeypatch):
 
 
 def kept_times(run):
-    """Return the number of recorded times of a run that may have ended early."""
+    """Return the number of recorded times of a run, which is smaller if the run ended early."""
     height = run.history("Pelvis_ty")
     assert len(height) == len(run.times) and np.isfinite(height).all() and run.times[-1] <= run.time
     return len(run.times)
