@@ -1,7 +1,7 @@
 """Virtual environment with only the base dependencies of osimlite, created in a moment and without a network.
 
-It has no pip. Its packages are links to those of the environment that runs the tests. All other packages are absent for
-Python itself: no import system is patched, and no function is replaced.
+It has no pip. Its packages are links to those of the environment that runs the tests. All other
+packages are absent for Python itself: no import system is patched, and no function is replaced.
 """
 
 from __future__ import annotations

@@ -16,7 +16,8 @@ def of_each(
         name: function that describes a case in the report.
 
     Returns:
-        Decorator; its test runs all cases and then raises all failures together, each with the name of its case.
+        Decorator; its test runs all cases and then raises all failures together, each with the name
+        of its case.
     """
 
     def made(test: Callable[[Any], None]) -> Callable[[], None]:

@@ -22,7 +22,8 @@ from tests.suite import Suite
 pytest_plugins = ["pytester"]
 
 ROOT = Path(__file__).resolve().parent.parent
-# Reference data too large to commit, in a folder next to the repository; tests that need it skip without it.
+# Reference data too large to commit, in a folder next to the repository; tests that need it skip
+# without it.
 SHARED = Path(os.environ.get("OSIMLITE_SHARED") or ROOT.parent / "shared")
 NO_SHARED = "needs the shared reference folder, which is not beside this repository"
 ROUNDED = {"m0079": 1e-6, "m0109": 1e-7, "m0168": 1e-7, "m0172": 1e-8}
@@ -37,7 +38,8 @@ LIBRARY_PATHS = {
 }
 """Values of the variables that an import of OpenSim changes, before that import."""
 
-# No deadline: a busy machine must not fail a property. In CI, a property must fail the same way twice.
+# No deadline: a busy machine must not fail a property. In CI, a property must fail the same way
+# twice.
 settings.register_profile(
     "osimlite", deadline=None, derandomize="CI" in os.environ, print_blob=True
 )
@@ -63,7 +65,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_configure(config: pytest.Config) -> None:
     """Register the plugins of the suite, and make processes that tests start interruptible.
 
-    A shell that starts pytest in the background makes it ignore SIGINT, and its child processes inherit that.
+    A shell that starts pytest in the background makes it ignore SIGINT, and its child processes
+    inherit that.
     """
     config.pluginmanager.register(
         Suite(config.getoption("--full"), config.getoption("--shuffle")), "osimlite-suite"
@@ -127,7 +130,8 @@ def pytest_runtest_setup() -> None:
     """Remove OpenSim's folder from the search paths of programs and libraries, where its import adds it.
 
     Processes that tests start would otherwise load OpenSim's CasADi instead of the installed one.
-    tests/oracle/conftest.py does the same while tests are collected, before workers inherit these variables.
+    tests/oracle/conftest.py does the same while tests are collected, before workers inherit these
+    variables.
     """
     for name, value in LIBRARY_PATHS.items():
         if value is None:

@@ -4,8 +4,8 @@ Run it with the Python of an environment into which only the wheel is installed:
 
     ENVIRONMENT/bin/python tests/core_install.py [--models FOLDER] [--all]
 
-It needs no pytest and prints a table of commands by exit codes. It exits with 1 if a command fails, prints a traceback,
-or requires a package that it should not need.
+It needs no pytest and prints a table of commands by exit codes. It exits with 1 if a command fails,
+prints a traceback, or requires a package that it should not need.
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 SHARED = Path(os.environ.get("OSIMLITE_SHARED", ROOT.parent / "shared"))
-# Packages that must be absent: with one of them, the checks would not test the base dependencies alone.
+# Packages that must be absent: with one of them, the checks would not test the base dependencies
+# alone.
 OPTIONAL_PACKAGES = (
     "numpy",
     "scipy",
@@ -41,7 +42,8 @@ OPTIONAL_PACKAGES = (
 PROJECTS = ("pipelines/pendulum", "pipelines/walking", "setups", "documents")
 """Folders of fixtures that are checked as complete projects."""
 
-# Fewer models or projects mean that a folder is missing, and that the checks would pass without a test.
+# Fewer models or projects mean that a folder is missing, and that the checks would pass without a
+# test.
 MIN_MODELS, MIN_PROJECTS = 12, 3
 NOTE = "did not run: they need osimlite[sim]"
 """Sentence in reports about rules that need numerical packages."""

@@ -12,8 +12,9 @@ import threading
 def leave(code: object) -> None:
     """End this process as `sys.exit` does, but do not destroy the objects of the interpreter.
 
-    Registered exit functions run, threads are joined, and the buffers of Python and C are flushed. Destructors of
-    remaining objects do not run. The full suite does not use this function, so that there processes end as usual.
+    Registered exit functions run, threads are joined, and the buffers of Python and C are flushed.
+    Destructors of remaining objects do not run. The full suite does not use this function, so that
+    there processes end as usual.
 
     Args:
         code: argument of `SystemExit`.

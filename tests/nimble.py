@@ -1,7 +1,7 @@
 """nimblephysics as a reference, in a separate environment because it needs NumPy 1.
 
-The variable OSIMLITE_NIMBLE names the Python of that environment: ``python3.11 -m venv nimble``, then ``nimble/bin/pip
-install nimblephysics 'numpy<2'``.
+The variable OSIMLITE_NIMBLE names the Python of that environment: ``python3.11 -m venv nimble``,
+then ``nimble/bin/pip install nimblephysics 'numpy<2'``.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ import pytest
 
 VARIABLE = "OSIMLITE_NIMBLE"
 
-# Script that calls one of its functions with arguments from standard input, and prints the result as JSON.
+# Script that calls one of its functions with arguments from standard input, and prints the result
+# as JSON.
 SCRIPT = """
 import json, os, sys
 import numpy as np

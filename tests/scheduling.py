@@ -13,10 +13,10 @@ if TYPE_CHECKING:
 class FileScheduling(LoadFileScheduling):  # type: ignore[misc]
     """Distribution of pytest-xdist by files, without three of its faults after the death of a worker.
 
-    Pytest-xdist 3.8 gives the test that killed a worker to the next worker, until eight have died. It assigns work to
-    workers that have not collected yet, which is an internal error. It also gives a new worker only one file: if one
-    test of that file is left, the worker waits for a second test before it runs the first. After the last two faults
-    pytest waits for ever.
+    Pytest-xdist 3.8 gives the test that killed a worker to the next worker, until eight have died.
+    It assigns work to workers that have not collected yet, which is an internal error. It also
+    gives a new worker only one file: if one test of that file is left, the worker waits for a
+    second test before it runs the first. After the last two faults pytest waits for ever.
     """
 
     def remove_node(self, node: WorkerController) -> str | None:

@@ -1,14 +1,14 @@
 """Scripts in separate processes that start quickly, as forks of a process that has imported what they need.
 
-OpenSim, CasADi and the commands of osimlite each take most of a second to import, and OpenSim and CasADi cannot be in
-one process. A test that needs one of them in a separate process calls `run_script`. As a program, this module is the
-server process that forks:
+OpenSim, CasADi and the commands of osimlite each take most of a second to import, and OpenSim and
+CasADi cannot be in one process. A test that needs one of them in a separate process calls
+`run_script`. As a program, this module is the server process that forks:
 
     python -m tests.scripts INPUT OUTPUT ERRORS MODULE...
 
-The first three arguments are descriptors of the files that scripts use as standard streams. Each order is a line of
-JSON with the text, the arguments, the folder and the environment of a script. The server answers with the process id of
-the script and, at its end, with the exit code.
+The first three arguments are descriptors of the files that scripts use as standard streams. Each
+order is a line of JSON with the text, the arguments, the folder and the environment of a script.
+The server answers with the process id of the script and, at its end, with the exit code.
 """
 
 from __future__ import annotations
@@ -99,7 +99,8 @@ def run_script(
         "arguments": [program, *arguments],
         "folder": where,
         "environment": environment,
-        # In the full suite, scripts run the finalization of Python, so that messages of libraries at the end are seen.
+        # In the full suite, scripts run the finalization of Python, so that messages of libraries
+        # at the end are seen.
         "ends": is_full(),
     }
     server.stdin.write(json.dumps(order) + "\n")
@@ -157,7 +158,8 @@ def copy_for_orders() -> dict[str, Any]:
     """Fork this process for each order, and return the order in the child that is to run it.
 
     Returns:
-        Order with the script, its arguments, folder and environment, and whether Python ends as usual.
+        Order with the script, its arguments, folder and environment, and whether Python ends as
+        usual.
 
     Raises:
         SystemExit: there are no more orders.
@@ -185,7 +187,8 @@ def copy_for_orders() -> dict[str, Any]:
 
 def main() -> None:
     """Import the modules, and run one script in each fork of this process."""
-    # Imports may change environment variables and search paths; `copy_for_orders` sets those of the order.
+    # Imports may change environment variables and search paths; `copy_for_orders` sets those of the
+    # order.
     for name in sys.argv[4:]:
         import_module(name)
     order = copy_for_orders()

@@ -1,9 +1,10 @@
 """Collection of ``check_*.py``: tests that run in a second process, next to the process that collects them.
 
-OpenSim contains a library of the same name as CasADi's, and one process cannot load both. Tests of functions that need
-CasADi are therefore in files ``check_*.py``. The process that collects such files starts a server (``python -m
-tests.separate``), which collects and runs their tests. Each of them is a test with its own name, marks and duration.
-The server keeps running, so that it imports modules once.
+OpenSim contains a library of the same name as CasADi's, and one process cannot load both. Tests of
+functions that need CasADi are therefore in files ``check_*.py``. The process that collects such
+files starts a server (``python -m tests.separate``), which collects and runs their tests. Each of
+them is a test with its own name, marks and duration. The server keeps running, so that it imports
+modules once.
 """
 
 from __future__ import annotations
@@ -118,7 +119,8 @@ class Checks:
         """Return name, line and marks of each test in a file.
 
         Raises:
-            CollectError: the server reports an error, for example because the file cannot be imported.
+            CollectError: the server reports an error, for example because the file cannot be
+                imported.
         """
         if path not in self._collected:
             # Collect all files of a folder at once: each call of pytest takes half a second.
@@ -315,7 +317,8 @@ def is_server(config: pytest.Config) -> bool:
 def serve() -> None:
     """Run pytest for each line of JSON on standard input; a line ``null`` ends its reports."""
     stream = os.fdopen(os.dup(1), "w", encoding="utf-8")
-    # The reports contain what pytest prints. Libraries print to the file descriptor, so it is redirected.
+    # The reports contain what pytest prints. Libraries print to the file descriptor, so it is
+    # redirected.
     with open(os.devnull, "w") as nothing:
         os.dup2(nothing.fileno(), 1)
     answers = Answers(stream)

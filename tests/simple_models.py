@@ -40,7 +40,8 @@ def make_single_body(
         at: position of the joint in ground (m).
         child_at: position of the joint on the body (m).
         turned: orientation of the joint frame in ground, as body-fixed X-Y-Z angles (rad).
-        properties: properties of the body; the default is a mass of 1 kg and principal moments of inertia of 1 kg m².
+        properties: properties of the body; the default is a mass of 1 kg and principal moments of
+            inertia of 1 kg m².
     """
     model = osimlite.Model(name=name)
     if gravity is not None:

@@ -1,6 +1,7 @@
 """Pytest plugin for the quick and the full suite: the options ``--full`` and ``--shuffle``.
 
-It also ends a process in which a test hangs, and makes pytest-xdist continue after the end of a worker.
+It also ends a process in which a test hangs, and makes pytest-xdist continue after the end of a
+worker.
 """
 
 from __future__ import annotations
@@ -55,7 +56,8 @@ class Suite:
     ) -> None:
         """Deselect the tests of the full suite."""
         if not separate.is_server(config):
-            # In the server of `check_*.py`, the process that requests tests has already selected and ordered them.
+            # In the server of `check_*.py`, the process that requests tests has already selected
+            # and ordered them.
             _mark_cases(config, items)
             if self.seed is not None:
                 items[:] = shuffle_tests(items, self.seed)
@@ -89,7 +91,8 @@ class Suite:
     ) -> Generator[None, Any, Any]:
         """End the process some time after pytest-timeout should have ended the test.
 
-        Pytest-timeout raises an exception in Python code, which never happens while a library hangs.
+        Pytest-timeout raises an exception in Python code, which never happens while a library
+        hangs.
         """
         if settings.timeout > 0:
             faulthandler.dump_traceback_later(
@@ -134,8 +137,8 @@ class Suite:
 def shuffle_tests(items: Sequence[pytest.Item], seed: int) -> list[pytest.Item]:
     """Return the tests in a random order of files, with a random order in each file.
 
-    The tests of a file stay together because they share fixtures. Every worker must get the same order, so the order
-    depends on the seed alone.
+    The tests of a file stay together because they share fixtures. Every worker must get the same
+    order, so the order depends on the seed alone.
     """
     draw = random.Random(seed)
     files: dict[str, list[pytest.Item]] = {}

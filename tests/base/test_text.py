@@ -86,7 +86,8 @@ def test_nothing_is_obeyed(text: str) -> None:
 @given(anything)
 def test_json_for_programs_keeps_everything_and_passes_everywhere(text: str) -> None:
     written = format_json({text: [text]})
-    # JSON for exchange contains no lone surrogates (RFC 8259, 8.2); `format_json` escapes them visibly.
+    # JSON for exchange contains no lone surrogates (RFC 8259, 8.2); `format_json` escapes them
+    # visibly.
     whole = text.encode("utf-16-le", "surrogatepass").decode("utf-16-le", "surrogatepass")
     whole = "".join(escape_unprintable(c) if "\ud800" <= c <= "\udfff" else c for c in whole)
     assert written.isascii() and json.loads(written) == {whole: [whole]}

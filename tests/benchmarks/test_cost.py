@@ -105,7 +105,8 @@ def test_the_file_holds_what_was_accepted(tmp_path: Path, monkeypatch: pytest.Mo
 def test_no_action_became_dearer() -> None:
     """Compare the measured costs with benchmarks/cost.json.
 
-    To accept other costs, run `python benchmarks/cost.py --accept` and give the reason in the commit message.
+    To accept other costs, run `python benchmarks/cost.py --accept` and give the reason in the
+    commit message.
     """
     for package in ("mujoco",):
         pytest.importorskip(package)

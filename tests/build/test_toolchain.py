@@ -92,7 +92,8 @@ def test_targets():
     assert "-mprefer-vector-width=256" in GCC.flags(NATIVE)
     assert "-mprefer-vector-width=256" not in CLANG.flags(NATIVE)
     assert "-mprefer-vector-width=256" not in GCC._replace(machine="aarch64").flags(NATIVE)
-    # The default inlining limits are too low for kernels; g++ and clang have different options for them.
+    # The default inlining limits are too low for kernels; g++ and clang have different options for
+    # them.
     assert any(flag.startswith("--param") for flag in GCC.flags(NATIVE))
     assert not any(flag.startswith("--param") for flag in CLANG.flags(NATIVE))
     assert "-inline-threshold=500" in CLANG.flags(

@@ -22,7 +22,8 @@ def load_commands() -> None:
             with suppress(ImportError):
                 for module in [line.module] if isinstance(line, ast.ImportFrom) else []:
                     import_module(module or "")
-    # Pictures need Matplotlib and its list of fonts, which it creates anew for each empty cache; help needs Typer.
+    # Pictures need Matplotlib and its list of fonts, which it creates anew for each empty cache;
+    # help needs Typer.
     drawing = "matplotlib.figure", "matplotlib.backends.backend_agg", "matplotlib.font_manager"
     for module in (*drawing, "typer.main", "typer.rich_utils"):
         with suppress(ImportError):
@@ -30,5 +31,6 @@ def load_commands() -> None:
 
 
 load_commands()
-# Do not print progress on standard error: on a busy machine all work may exceed the time after which it appears.
+# Do not print progress on standard error: on a busy machine all work may exceed the time after
+# which it appears.
 _progress.LONG_S = inf

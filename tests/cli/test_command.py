@@ -110,7 +110,8 @@ def test_an_option_of_a_simulation_is_declared_once() -> None:
     for choice in list_options(Options):
         default = getattr(Options(), choice.name)
         assert taken[choice.name].default == choice.default
-        # A default of None with a text means that the option is omitted and the library's default applies.
+        # A default of None with a text means that the option is omitted and the library's default
+        # applies.
         assert choice.default == default or (
             choice.default is None and choice.default_text == f"{default}"
         )

@@ -17,7 +17,8 @@ pytest.importorskip("matplotlib", reason="needs matplotlib (extra 'plot')")
 
 
 def test_the_whole_tour(tmp_path: Path) -> None:
-    # The quick suite leaves out the pictures: .ci/run makes them, and tests/view draws shorter motions.
+    # The quick suite leaves out the pictures: .ci/run makes them, and tests/view draws shorter
+    # motions.
     pictures = is_full()
     words = () if pictures else ("--no-pictures",)
     done = run("demo", "-o", "out", *words, folder=tmp_path)

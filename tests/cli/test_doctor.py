@@ -251,7 +251,8 @@ def test_an_interrupt_does_not_wait_for_packages(
     with pytest.raises(KeyboardInterrupt):
         doctor()
     assert time.monotonic() - started < 10.0
-    # After the interruption no thread may start another slow process: this examination must be quick.
+    # After the interruption no thread may start another slow process: this examination must be
+    # quick.
     started = time.monotonic()
     assert examine_package("lxml").name == "lxml"
     assert time.monotonic() - started < 10.0

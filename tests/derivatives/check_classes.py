@@ -1,6 +1,7 @@
 """Tests of all classes of forces, joints and constraints as CasADi functions.
 
-Values, Jacobians and Hessians are compared with those of the kernels on numbers that carry derivatives (`jets.py`).
+Values, Jacobians and Hessians are compared with those of the kernels on numbers that carry
+derivatives (`jets.py`).
 """
 
 from __future__ import annotations
@@ -60,7 +61,8 @@ GEODESICS = "path over obstacles"
 LEFT = {"ElasticFoundationForce", "ExternalForce"}
 """Classes without a case of their own.
 
-Meshes (ElasticFoundationForce) are refused; an ExternalForce only adds functions of time, as a PrescribedForce does.
+Meshes (ElasticFoundationForce) are refused; an ExternalForce only adds functions of time, as a
+PrescribedForce does.
 """
 EXACT = 1e-11
 CASES = FORCES | {
@@ -104,7 +106,8 @@ def test_forces(name):
 
 @pytest.mark.parametrize("case", CONFIGURATIONS)
 def test_muscles(case, monkeypatch):
-    # OpenSim's tolerance of the velocity iteration, which the kernels have, would dominate the difference.
+    # OpenSim's tolerance of the velocity iteration, which the kernels have, would dominate the
+    # difference.
     monkeypatch.setattr(millard2012_equilibrium, "VELOCITY_TOLERANCE", 1e-14)
     model = hung(muscle(case), (0.4, 0.6))
     model["/jointset/slide/x"].default_value = 0.322
@@ -243,5 +246,6 @@ def test_trees_of_joints(held, seed):
     scale = 1.0 + np.abs(value).max()
     assert off(got[0][:, 0], value, scale) < 1e-9
     assert off(got[1], jacobian, scale) < 1e-9
-    # Dependent equations hold on the constraint manifold only, and second derivatives across it are not unique.
+    # Dependent equations hold on the constraint manifold only, and second derivatives across it are
+    # not unique.
     assert len(equations) < count or off(got[2][:, 0], bends @ way, scale) < 1e-8

@@ -58,8 +58,8 @@ def states_near(functions, seed, count):
 def test_shoulders_in_motion(number):
     """Compare state derivatives on shoulder models.
 
-    Around tori and ellipsoids, OpenSim's lengthening speeds differ from moment arms times speeds; rates of a scapula's
-    coordinates are not its generalized speeds.
+    Around tori and ellipsoids, OpenSim's lengthening speeds differ from moment arms times speeds;
+    rates of a scapula's coordinates are not its generalized speeds.
     """
     for path in (CORPUS / number).glob("*.osim"):
         both = Beside(osimlite.read(path))

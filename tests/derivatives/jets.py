@@ -1,7 +1,7 @@
 """Exact first and second derivatives of the kernels by automatic differentiation (R. E. Wengert, 1964).
 
-The kernels run as Python on numbers that carry their derivatives. This is independent of the way in which CasADi traces
-the kernels: branches are taken as in machine code.
+The kernels run as Python on numbers that carry their derivatives. This is independent of the way in
+which CasADi traces the kernels: branches are taken as in machine code.
 """
 
 from __future__ import annotations
@@ -159,7 +159,8 @@ def _of_one(name: str) -> Callable[[Any], Any]:
 def _angle(y: Any, x: Any) -> Any:
     if not (isinstance(x, Jet) or isinstance(y, Jet)):
         return math.atan2(y, x)
-    # The quotient with the smaller magnitude avoids a division by zero; its arctangent has the same derivatives.
+    # The quotient with the smaller magnitude avoids a division by zero; its arctangent has the same
+    # derivatives.
     part = MATHEMATICS["atan"](y / x) if abs(x) > abs(y) else -MATHEMATICS["atan"](x / y)
     return part + (math.atan2(float(y), float(x)) - part.v)
 
@@ -169,7 +170,8 @@ def _copy_sign(x: Any, y: float) -> Any:
     if not isinstance(x, Jet):
         return math.copysign(x, y)
     value = math.copysign(x.v, y)
-    # |x| has no derivative at 0: a number that is not negative keeps its derivatives unless its sign changes.
+    # |x| has no derivative at 0: a number that is not negative keeps its derivatives unless its
+    # sign changes.
     same_sign = (x.v < 0.0) == (value < 0.0)
     return x.through(value, 1.0 if same_sign else -1.0, 0.0)
 
@@ -250,8 +252,8 @@ def carried(
         along: direction (n,) of the second derivative.
 
     Returns:
-        State derivative (n,), its Jacobian by the state (n, n), and the derivative of the Jacobian along the
-        direction (n, n).
+        State derivative (n,), its Jacobian by the state (n, n), and the derivative of the Jacobian
+        along the direction (n, n).
     """
     program = Program(packed, PYTHON_CODE)
     s = program.ints

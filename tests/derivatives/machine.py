@@ -83,11 +83,12 @@ class Beside:
     def errors(self, x: np.ndarray, seed: int = 0) -> dict[str, float]:
         """Compare value, Jacobian and Hessian by the state with those of the kernels, at random controls.
 
-        The Hessian is that of a random combination of the rows, along a random direction. Functions that are no SX
-        expressions have none.
+        The Hessian is that of a random combination of the rows, along a random direction. Functions
+        that are no SX expressions have none.
 
         Returns:
-            Largest differences of "value", "jacobian" and "hessian", relative to the size of the terms or to one.
+            Largest differences of "value", "jacobian" and "hessian", relative to the size of the
+            terms or to one.
         """
         f, rng, n = self.functions, np.random.default_rng(seed), len(x)
         u, push, along = (
@@ -110,7 +111,8 @@ class Beside:
 
     def _derivatives(self, *given: np.ndarray) -> list[np.ndarray]:
         if self._made is None:
-            # Import CasADi here: processes with OpenSim cannot load it, but use the rest of this module.
+            # Import CasADi here: processes with OpenSim cannot load it, but use the rest of this
+            # module.
             import casadi
 
             n, made = len(self.functions.states), self.functions.dynamics

@@ -227,7 +227,8 @@ def test_whole_models(name):
         np.abs(change - np.hstack((a, b)) @ along).max()
         < 1e-12 * np.abs(np.hstack((a, b))).max() * np.abs(along).sum()
     )
-    # Differences check what jets do not: searches have the derivatives of their roots, not those of their steps.
+    # Differences check what jets do not: searches have the derivatives of their roots, not those of
+    # their steps.
     none = np.zeros((size, 0))
 
     def moved(h):

@@ -1,9 +1,9 @@
 """Run every block of code in the manual, page by page, in the order of the page, each page in a new folder.
 
-Python blocks of a page share their names; `sh` blocks are run by bash; TOML, YAML, JSON and XML are parsed. A comment
-``<!-- prepared: commands -->`` creates files that a page assumes; ``<!-- not run: reason -->`` before a block says why
-it cannot be run here. After ``<!-- tried: what -->`` comes a table: the commands and the Python in all but its first
-column are run.
+Python blocks of a page share their names; `sh` blocks are run by bash; TOML, YAML, JSON and XML are
+parsed. A comment ``<!-- prepared: commands -->`` creates files that a page assumes; ``<!-- not run:
+reason -->`` before a block says why it cannot be run here. After ``<!-- tried: what -->`` comes a
+table: the commands and the Python in all but its first column are run.
 """
 
 from __future__ import annotations
@@ -77,7 +77,8 @@ def blocks(text: str) -> list[Block]:
 @pytest.fixture
 def shell(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """Return environment variables with which `osimlite` and `python` are those under test."""
-    # Share the folder of Matplotlib: with a new one it lists the fonts of the machine, which takes seconds.
+    # Share the folder of Matplotlib: with a new one it lists the fonts of the machine, which takes
+    # seconds.
     fonts = os.environ.get("MPLCONFIGDIR") or str(tmp_path_factory.getbasetemp() / "matplotlib")
     path = os.pathsep.join((str(Path(sys.executable).parent), os.environ.get("PATH", "")))
     home = {

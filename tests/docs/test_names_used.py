@@ -1,6 +1,7 @@
 """Tests that everything the manual uses exists: functions, keywords, commands and options.
 
-The full suite executes the manual. These tests only read it: they are quick, and cover blocks that are never executed.
+The full suite executes the manual. These tests only read it: they are quick, and cover blocks that
+are never executed.
 """
 
 from __future__ import annotations
@@ -115,7 +116,8 @@ def check_keywords(call: ast.Call, function: Any) -> None:
     if not inspect.isfunction(function) and not inspect.isclass(function):
         return
     if inspect.isclass(function) and issubclass(function, Object):
-        # The signature of a model class is complete only after pydantic has built a validator, and lacks the tags.
+        # The signature of a model class is complete only after pydantic has built a validator, and
+        # lacks the tags.
         accepted = {"name", *function.model_fields, *function.field_specs()}
         assert {keyword.arg for keyword in call.keywords} - {None} <= accepted, ast.unparse(call)
         return

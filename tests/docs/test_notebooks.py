@@ -22,7 +22,8 @@ SHOWN = {
 }
 """Texts that the outputs of each notebook must contain."""
 
-# Only check that packages exist: every process of pytest collects this module, and importing them is slow.
+# Only check that packages exist: every process of pytest collects this module, and importing them
+# is slow.
 for package in ("ipykernel", "nbclient", "matplotlib", "xarray", "cma", "mujoco", "mkdocs"):
     if find_spec(package) is None:
         pytest.skip(f"needs {package} (extra 'dev')", allow_module_level=True)

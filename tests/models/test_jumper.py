@@ -30,7 +30,8 @@ def test_it_squats_in_balance():
         start, count = simulation.initial_state({}, {}), len(simulation.engine.order)
         rates = simulation.engine.compute_derivative(0.0, start)
         rest = simulation.engine.equilibrate_muscles(0.0, start)
-    # Accelerations are not exactly zero: rounded fiber lengths leave forces that accelerate the feet of 1 kg.
+    # Accelerations are not exactly zero: rounded fiber lengths leave forces that accelerate the
+    # feet of 1 kg.
     assert np.abs(rates[count : 2 * count]).max() < 0.5
     assert start == pytest.approx(rest, abs=1e-6)
 

@@ -58,8 +58,9 @@ def straight(
     """Compute the tension of a muscle with a rigid tendon and linear force-length and force-velocity relations.
 
     Returns:
-        Tension (N), activation, fiber length (m), cosine of pennation, active force-length multiplier, force-velocity
-        multiplier, active force (N), passive force (N), activation rate (1/s), fiber velocity (m/s).
+        Tension (N), activation, fiber length (m), cosine of pennation, active force-length
+        multiplier, force-velocity multiplier, active force (N), passive force (N), activation rate
+        (1/s), fiber velocity (m/s).
     """
     fibers = now.length - slack
     active = max(1.0 - abs(fibers / optimal - 1.0) / width, 0.0)

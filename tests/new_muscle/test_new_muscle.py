@@ -94,7 +94,8 @@ def test_the_linter_knows_its_domains(file):
         ("<width>0.1</width>", "OSIM209", "its grip is above 1 + width: OpenSim rejects the model"),
     ):
         every = findings(file, "<grip>1.2</grip>", f"<grip>1.2</grip>{new}")
-        # OSIM531 also reports a time constant that is not positive, because osimlite cannot simulate with it.
+        # OSIM531 also reports a time constant that is not positive, because osimlite cannot
+        # simulate with it.
         [(result, message)] = [finding for finding in every if finding[0] != "OSIM531"]
         assert (len(every) == 2) == ("rise_time>-1<" in new)
         assert (result, words in message) == (code, True), message
@@ -110,8 +111,8 @@ def test_it_moves_and_is_recorded(file, engine):
     activation = trajectory.auxiliary["/forceset/biceps/activation"]
     assert activation[0] == 0.4
     assert activation[-1] == pytest.approx(1.0 - 0.6 * math.exp(-0.05 / 0.02), rel=1e-7)
-    # Initial force: strength times activation times 1 - 0.2 / 0.5, for a strain of 0.2. It pulls the load towards
-    # ground.
+    # Initial force: strength times activation times 1 - 0.2 / 0.5, for a strain of 0.2. It pulls
+    # the load towards ground.
     force = 100.0 * 0.4 * (1.0 - 0.2 / 0.5)
     assert trajectory.forces["biceps"][0] == pytest.approx(force, rel=1e-12)
     assert trajectory.values[-1][0] < 0.32
@@ -132,7 +133,8 @@ def test_mujoco_has_it(file):
     mjcf = osimlite.to_mjcf(osimlite.read(file))
     compiled = mujoco.MjModel.from_xml_string(mjcf.text)
     actuator = compiled.actuator("biceps")
-    # The curves of MuJoCo are fitted by least squares; strength, vmax and fvmax are those of the model.
+    # The curves of MuJoCo are fitted by least squares; strength, vmax and fvmax are those of the
+    # model.
     assert (actuator.gainprm[2], actuator.gainprm[6], actuator.gainprm[8]) == pytest.approx(
         (100.0, 10.0, 1.2)
     )

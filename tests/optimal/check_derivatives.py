@@ -73,7 +73,8 @@ def worst(found, wanted, name):
         name: function that names a row.
 
     Returns:
-        Largest difference relative to the largest entry of its row or to one, and a text that says where it is.
+        Largest difference relative to the largest entry of its row or to one, and a text that says
+        where it is.
     """
     off = np.abs(found - wanted) / np.maximum(1.0, np.abs(wanted).max(axis=1, keepdims=True))
     row, column = np.unravel_index(np.argmax(off), off.shape)
@@ -87,7 +88,8 @@ def check(study, folder, *, tolerance=1e-7, curved=True):
     layout, rng = program.layout, np.random.default_rng(3)
     low, high = np.maximum(layout.lower, -1.0), np.minimum(layout.upper, 1.0)
     w = np.clip(low + (high - low) * rng.uniform(0.2, 0.8, len(low)), layout.lower, layout.upper)
-    # Variables with equal bounds do not move: at fixed times a prescribed motion is known at these times only.
+    # Variables with equal bounds do not move: at fixed times a prescribed motion is known at these
+    # times only.
     moving = np.eye(len(w))[:, layout.lower < layout.upper]
     push = rng.normal(size=len(program.labels))
 
@@ -112,7 +114,8 @@ def check(study, folder, *, tolerance=1e-7, curved=True):
         return
     hessian = Hessian(program)
     half = matrix(hessian.sparsity, hessian.compute_entries(w, 0.7, push)).toarray()
-    # An entry that is missing in the declared pattern changes the sums of its group, and is found too.
+    # An entry that is missing in the declared pattern changes the sums of its group, and is found
+    # too.
     curves = (half + np.triu(half, 1).T) @ moving
     ways = apart(curves != 0.0)
     off, where = worst(

@@ -64,7 +64,8 @@ def test_a_fault_is_told(kind, tmp_path):
             file.unlink()
         else:
             file.write_bytes(change.text.encode())
-            # Set distinct times: files of equal length that are written within one tick of the clock look unchanged.
+            # Set distinct times: files of equal length that are written within one tick of the
+            # clock look unchanged.
             os.utime(file, (10 * number, 10 * number))
         try:
             told = any(said_of(study))

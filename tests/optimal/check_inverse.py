@@ -18,8 +18,8 @@ NAME = "squat_inverse-20"
 def squat(folder, **choices):
     """Return the MocoInverse tool of the squat.
 
-    The study that OpenSim wrote for it contains the motion with six digits only, so the motion comes from the solution
-    file instead.
+    The study that OpenSim wrote for it contains the motion with six digits only, so the motion
+    comes from the solution file instead.
     """
     model = study(folder, NAME).problem.phases.model.model.copy_deep()
     for motion in list(model.components(osimlite.PositionMotion)):
@@ -50,7 +50,8 @@ def test_moco_s_solution_is_one_here(tmp_path):
     program = Program(build_inverse_problem(squat(tmp_path), folder=tmp_path))
     terms, missed = evaluate(program, MocoTrajectory.read(moco_found(tmp_path, NAME)))
     assert terms == pytest.approx(moco_said(NAME)["terms"], rel=1e-9)
-    # The rows are N m, with terms of some hundreds; OpenSim's poses fulfil the patella constraint to about 1e-9.
+    # The rows are N m, with terms of some hundreds; OpenSim's poses fulfil the patella constraint
+    # to about 1e-9.
     assert missed[0].size < 1e-3
 
 

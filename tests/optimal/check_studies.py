@@ -47,7 +47,8 @@ def test_ours_costs_no_more(name, solved, tmp_path):
     said, found = moco_said(name), solved(name)
     assert found.success
     if name == "squat-25":
-        # At the study's tolerance, rounding decides where a search ends, 4e-4 to 2e-3 above the optimum.
+        # At the study's tolerance, rounding decides where a search ends, 4e-4 to 2e-3 above the
+        # optimum.
         assert found.objective == pytest.approx(said["objective"], rel=2e-3)
         found = solve(study(tmp_path, name, optim_convergence_tolerance=1e-5))
     assert found.objective <= said["objective"] * (1.0 + 1e-4)

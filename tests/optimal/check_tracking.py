@@ -60,7 +60,8 @@ def test_moco_s_walk_is_one_here(example, tmp_path):
     terms, missed = evaluate(program, MocoTrajectory.read(moco_found(tmp_path, "walk-10t4")))
     assert terms == pytest.approx(moco_said("walk-10t4")["terms"], rel=1e-10)
     assert missed[0].size < 3e-6
-    # References are functions of time: their derivatives must be exact where the times are variables too.
+    # References are functions of time: their derivatives must be exact where the times are
+    # variables too.
     w = program.layout.make_guess()
     way = np.random.default_rng(0).normal(size=len(w)) * 1e-2
     way[:2] = 0.01, -0.02

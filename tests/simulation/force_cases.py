@@ -224,7 +224,8 @@ FORMULA = "3*q^2 - w*exp(-q/2) + max(qdot, -1)*step(q); w = sin(v)*abs(qdot); v 
 ALL = "sqrt(abs(d)) + log(1+d*d) - sin(d)*cos(d)/sec(d) + csc(1+d*d) + tan(d/3) - cot(1+d*d) + asin(d/9) + acos(d/9)"
 MORE = "atan(d) + sinh(d/4) + cosh(d/4) - tanh(d) + erf(d) + erfc(d) + delta(d) + square(d) - cube(d) + recip(2+d*d)"
 
-# Functions that return the components of each case: a force named "a", with its controllers and surfaces.
+# Functions that return the components of each case: a force named "a", with its controllers and
+# surfaces.
 FORCES = {
     "limit": lambda: CoordinateLimitForce(
         name="a",

@@ -202,7 +202,8 @@ def tree(joints, *, parents=None, reversed=(), locked=()):
 
 
 def engines(model, **settings):
-    # Import here: models and states of this module also serve tests in environments without PyBullet.
+    # Import here: models and states of this module also serve tests in environments without
+    # PyBullet.
     from osimlite.simulation.engines.bullet.engine import BulletEngine
 
     mechanism = build_mechanism(model)

@@ -61,8 +61,8 @@ def problem(
         frames: number of frames.
 
     Returns:
-        Transposed matrices (frames, n, m), right-hand sides (frames, m), and lower and upper bounds (n,), some
-        of them infinite.
+        Transposed matrices (frames, n, m), right-hand sides (frames, m), and lower and upper bounds
+        (n,), some of them infinite.
     """
     columns = random.normal(size=(frames, n, m)) * (random.random((frames, n, m)) < 0.6)
     low, high = -random.random(n), random.random(n)
@@ -109,7 +109,8 @@ def test_the_quadratic_problem() -> None:
         assert missing == pytest.approx(0.0, abs=1e-11)
         assert (low <= x).all()
         assert (x <= high).all()
-        # At the minimum, free unknowns follow from multipliers of the equations; at bounds these point outwards.
+        # At the minimum, free unknowns follow from multipliers of the equations; at bounds these
+        # point outwards.
         free = (low < x) & (x < high)
         push, *_ = np.linalg.lstsq(columns[0][free], x[free], rcond=None)
         pulled = columns[0] @ push

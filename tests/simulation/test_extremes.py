@@ -117,7 +117,8 @@ def test_any_number_gets_one_verdict(data):
     text = to_text(with_force(FORCES[name]))
     leaf = data.draw(st.sampled_from(list(NUMBERS.finditer(text))))
     words, extreme = leaf[2].split(), data.draw(st.sampled_from(EXTREMES))
-    # With a mass centre at 1e16 m, the body's own inertia is a rounding error, and so is the sign of the sum.
+    # With a mass centre at 1e16 m, the body's own inertia is a rounding error, and so is the sign
+    # of the sum.
     assume(not (extreme == "1e16" and leaf[0].startswith("<mass_center>")))
     places = data.draw(
         st.sampled_from([[place] for place in range(len(words))] + [list(range(len(words)))])

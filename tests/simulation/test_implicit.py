@@ -320,7 +320,8 @@ def test_an_unknown_integrator_is_refused(walker):
 @pytest.mark.parametrize(("method", "accuracy"), [("adams", 1e-3), ("bdf", 1e-2)])
 def test_derivatives_that_became_too_large_end_no_iteration(method, accuracy):
     model = hung(muscle("thelen_default"))
-    # The fiber pulls with e^40 times its force, and with less after each step, so that old derivatives are too large.
+    # The fiber pulls with e^40 times its force, and with less after each step, so that old
+    # derivatives are too large.
     model.find("/forceset/mu").default_fiber_length = 0.16
     with Simulation(model, "compiled") as simulation:
         result, exact = (

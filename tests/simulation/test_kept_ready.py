@@ -178,7 +178,8 @@ def test_a_model_that_has_moved_moves_in_one_call(repo, monkeypatch):
     osimlite.simulate(model, to=1.0, engine="compiled")
     calls.clear()
     last = osimlite.simulate(model, to=1.0, engine="compiled")
-    # Earlier runs decide how many steps a call takes: one call for all, or a few if the machine paused meanwhile.
+    # Earlier runs decide how many steps a call takes: one call for all, or a few if the machine
+    # paused meanwhile.
     assert len(calls) < at_first
     assert np.array_equal(first.values, last.values)
     assert first.summary["contact_events"] == last.summary["contact_events"]

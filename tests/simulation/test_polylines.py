@@ -66,7 +66,8 @@ def test_corners_on_a_surface_are_on_it(name, wrapping):
     paths = paths_over(surface.model_copy(deep=True), *ends, wrapping=wrapping)
     corners = paths.polylines({})["/forceset/p"]
     assert len(corners) > 6 and corners[[0, -1]].tolist() == [list(end) for end in ends]
-    # As in OpenSim, tangent points are only near the ellipsoid, and the tube of the torus is straight there.
+    # As in OpenSim, tangent points are only near the ellipsoid, and the tube of the torus is
+    # straight there.
     near = {"ellipsoid": 1e-4, "torus": 1e-3}.get(name, 1e-12) if wrapping == "opensim" else 1e-9
     assert level(corners[1:-1]) == pytest.approx(1.0, abs=near)
     length = np.linalg.norm(np.diff(corners, axis=0), axis=1).sum()

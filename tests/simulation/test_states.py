@@ -176,7 +176,8 @@ def test_random_models_keep_their_states(seed, tmp_path_factory):
     assert ends["bullet", "accuracy"] == pytest.approx(
         ends["compiled", "accuracy"], rel=1e-7, abs=1e-9
     )
-    # Bullet integrates the rates of its joints, and some of these differ from the generalized speeds.
+    # Bullet integrates the rates of its joints, and some of these differ from the generalized
+    # speeds.
     for engine in ("bullet", "compiled"):
         assert ends[engine, "fixed_step"] == pytest.approx(
             ends["compiled", "accuracy"], rel=0.1, abs=0.1

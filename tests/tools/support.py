@@ -143,7 +143,8 @@ def tables(folder: Path, model: Model, analyses: str, *, check: bool = True) -> 
         folder: folder of the files.
         model: the model.
         analyses: XML of the analyses.
-        check: refuse what OpenSim 4.6 refuses; without it, classes that OpenSim 4.6 lacks are accepted.
+        check: refuse what OpenSim 4.6 refuses; without it, classes that OpenSim 4.6 lacks are
+            accepted.
 
     Returns:
         Tables by name.

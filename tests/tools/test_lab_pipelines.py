@@ -170,7 +170,8 @@ def test_an_unknown_force_to_exclude_does_not_end_a_run(tmp_path: Path) -> None:
 def test_computed_controls_do_not_depend_on_rounding(tmp_path: Path) -> None:
     """Adding the width of an atom to the length of a tendon changes no muscle force.
 
-    Fibers of a short muscle at a small activation are stiff. With the accuracy of OpenSim's prediction they do not
+    Fibers of a short muscle at a small activation are stiff. With the accuracy of OpenSim's
+    prediction they do not
     converge: the first forces change by 0.8 N, those after 0.1 s by 85 N.
     """
     tables = []

@@ -50,7 +50,8 @@ def test_rates_and_powers_follow_from_lengths_and_forces() -> None:
             "FiberVelocity": fiber,
             "NormFiberVelocity": fiber / (0.09 * 12.0),
             "PennationAngularVelocity": turning,
-            # The passive power is that of the parallel spring, and the active power that of all other fiber forces.
+            # The passive power is that of the parallel spring, and the active power that of all
+            # other fiber forces.
             "FiberPassivePower": -70.0 * fiber,
             "FiberActivePower": -(180.0 + 90.0 - 70.0) * fiber,
             "TendonPower": -250.0 * tendon,

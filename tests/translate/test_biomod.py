@@ -109,7 +109,8 @@ def test_paths_that_biorbd_cannot_follow_have_measured_errors() -> None:
     muscle = osimlite.Thelen2003Muscle(name="turner")
     pelvis, tail = model["/bodyset/pelvis"], model["/bodyset/tail"]
     muscle.geometry_path.add_point(pelvis, (0.0, 0.1, 0.0))
-    # The coordinate never reaches this range: OpenSim's path is straight, but biorbd's has a corner.
+    # The coordinate never reaches this range: OpenSim's path is straight, but biorbd's has a
+    # corner.
     muscle.geometry_path.path_point_set.objects.append(
         osimlite.ConditionalPathPoint(
             name="corner",

@@ -245,8 +245,8 @@ def test_an_edited_file_is_driven(tmp_path):
 NEARLY = {"m0163": 3e-3, "m0466": 1e-3}
 """Tolerances, relative to the largest acceleration, of models that are less exact than 1e-8.
 
-In m0163 a constraint of the shoulder is nearly redundant (5e-4 with Python 3.11, 1.2e-3 with the later numpy of 3.13);
-m0466 has a helper body of 1 g.
+In m0163 a constraint of the shoulder is nearly redundant (5e-4 with Python 3.11, 1.2e-3 with the
+later numpy of 3.13); m0466 has a helper body of 1 g.
 """
 
 

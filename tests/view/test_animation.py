@@ -64,7 +64,8 @@ def test_the_film_runs_at_the_speed_of_the_motion(film):
 
 def test_forces_are_drawn_while_they_act(film):
     pictures = [picture for picture, _ in film[0]]
-    # The foot is loaded from 0.1 to 0.3 s; the scale of the forces has the same colour all the time.
+    # The foot is loaded from 0.1 to 0.3 s; the scale of the forces has the same colour all the
+    # time.
     scale = has(pictures[0], to_hex(FORCE))
     assert scale > 0
     assert has(pictures[5], to_hex(FORCE)) > scale + 50

@@ -140,7 +140,8 @@ def test_the_page_has_lengths_and_moment_arms_of_paths(shared, open_page, tmp_pa
     q = values(page)
     lengths, arms = paths.lengths(q), paths.moment_arms(q)
     names = [line.path for line in view.scene.lines if line.layer == "paths"]
-    # Moment arms at knees, which move the patella as well, at hips, and at joints that the paths do not cross.
+    # Moment arms at knees, which move the patella as well, at hips, and at joints that the paths do
+    # not cross.
     for coordinate in ("knee_angle_r", "hip_flexion_r", "ankle_angle_l"):
         place = mechanism.coordinate_index(coordinate)
         result = page.run("x[1].map((k) => v.mechanism.over(k, x[0], v.q))", [place, [*range(80)]])

@@ -63,7 +63,8 @@ def test_glass_lets_shine_through_from_the_back_to_the_front():
     canvas.draw_opaque(*triangle((0, 0, 0), (32, 0, 0), (0, 32, 0), color=WHITE))
     colors = np.array([np.tile(color, (3, 1)) for color in (RED, GREEN, GREEN)])
     canvas.draw_translucent(places, colors, np.array((0.5, 0.5, 1.0)))
-    # The colour is half green over half red over white; what is behind the opaque white surface is hidden.
+    # The colour is half green over half red over white; what is behind the opaque white surface is
+    # hidden.
     assert np.abs(canvas.to_pixels()[4, 4].astype(int) - (191, 128, 64)).max() <= 1
 
 

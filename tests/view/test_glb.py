@@ -106,7 +106,8 @@ def test_bodies_and_shapes_move(tmp_path):
                 )
                 < 1e-4
             )
-    # Players interpolate quaternions linearly, which is the short way only if neighbours have the same sign.
+    # Players interpolate quaternions linearly, which is the short way only if neighbours have the
+    # same sign.
     for channel, sampler in zip(
         *(read.parts["animations"][0][what] for what in ("channels", "samplers")), strict=True
     ):

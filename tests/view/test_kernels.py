@@ -98,7 +98,8 @@ def test_models_are_where_osimlite_has_them_and_their_paths_pull_alike(name, sha
         assert np.abs(q - expected).max() < 1e-12
         assert off(bodies, mechanism.at(expected)) < 1e-12
         lengths, arms = paths.lengths(expected), paths.compute_moment_arms(expected[None])[0]
-        # Rounding errors grow with the motion of dependent coordinates per motion of the selected one.
+        # Rounding errors grow with the motion of dependent coordinates per motion of the selected
+        # one.
         polylines, far = paths.polylines(expected), np.abs(paths.compute_coupling(expected)).max()
         for route, line, row in zip(routes, corners, measured, strict=True):
             assert line == pytest.approx(polylines[route].ravel(), abs=1e-12)

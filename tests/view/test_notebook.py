@@ -110,7 +110,8 @@ def test_paths_are_a_table_of_lengths_and_moment_arms():
         osimlite.PathSpring(name="spring", geometry_path=path, resting_length=0.1, stiffness=1.0)
     )
     html = osimlite.paths(model)._repr_html_()
-    # 0.13 m is the hypotenuse of 0.05 and 0.12 m; the moment arm follows from the area of the triangle.
+    # 0.13 m is the hypotenuse of 0.05 and 0.12 m; the moment arm follows from the area of the
+    # triangle.
     assert "<td style='text-align:left'>0.13</td>" in html and "flexion 0.04615" in html
 
 

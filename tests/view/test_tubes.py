@@ -179,7 +179,8 @@ def test_strong_muscles_are_drawn_thicker(jumper, tmp_path):
         shown = ModelView.from_model(model, motion=active_motion(model, 1.0))
         picture = np.asarray(image.open(shown.write_picture(tmp_path / "a.png", (500, 500))))
         areas.append(count_pixels(picture, activity_color(1.0)))
-    # The radius, and with it the area in the picture, grows with the square root of the force: by 3.
+    # The radius, and with it the area in the picture, grows with the square root of the force: by
+    # 3.
     assert 2.0 < areas[1] / areas[0] < 3.5
 
 

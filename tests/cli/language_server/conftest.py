@@ -46,7 +46,8 @@ async def client(server: pytest_lsp.LanguageClient) -> AsyncIterator[pytest_lsp.
     for uri in OPENED:
         document = types.TextDocumentIdentifier(uri)
         server.text_document_did_close(types.DidCloseTextDocumentParams(document))
-    # Messages arrive in order: all diagnostics of these files come before this answer, none during the next test.
+    # Messages arrive in order: all diagnostics of these files come before this answer, none during
+    # the next test.
     question = types.HoverParams(types.TextDocumentIdentifier("file:///none"), types.Position(0, 0))
     with pytest.raises(Exception, match="is not open"):
         await server.text_document_hover_async(question)

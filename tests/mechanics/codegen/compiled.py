@@ -15,7 +15,7 @@ import pytest
 
 from osimlite.mechanics.codegen.cplusplus import HEADER, header_text
 
-# Command of the compiler; None if there is none.
+# Command of the compiler, or None without a compiler.
 COMPILER = os.environ.get("CXX") or next(
     filter(None, map(shutil.which, ("clang++", "g++", "c++"))), None
 )
@@ -42,7 +42,8 @@ def compile_text(folder, text, *flags, compiler=COMPILER, name="kernels"):
 def build_library(folder, text, *flags, compiler=COMPILER, name="kernels"):
     """Compile C++ text without a warning, and return the path of the library.
 
-    A library with a sanitizer must not be loaded here: it ends a process that did not start with it.
+    A library with a sanitizer must not be loaded here: it ends a process that did not start with
+        it.
 
     Args:
         folder: folder of the files.

@@ -1,7 +1,7 @@
 """Functions in the restricted Python of kernels, one for each group of its constructs.
 
-Each takes integers, floats, a vector for its results and a count, as kernels do, and returns an integer. The tests run
-them as Python, as C++ and as JavaScript.
+Each takes integers, floats, a vector for its results and a count, as kernels do, and returns an
+integer. The tests run them as Python, as C++ and as JavaScript.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Print digests of motions and derivatives of models, computed by the kernels of one library.
 
-Arguments of the program: path of a shared library with all kernels, number of motions, and number of models whose
-derivatives are computed. With `-` for the path, osimlite selects its kernels as usual. Models of the shared folder are
-added, half as many, if it exists.
+Arguments of the program: path of a shared library with all kernels, number of motions, and number
+of models whose derivatives are computed. With `-` for the path, osimlite selects its kernels as
+usual. Models of the shared folder are added, half as many, if it exists.
 """
 
 from __future__ import annotations

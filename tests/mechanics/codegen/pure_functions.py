@@ -1,6 +1,7 @@
 """Kernels that call the pure numerical functions of kernels and laws with arguments from vectors.
 
-As a program, it calls the functions of a library many times, for builds that stop at undefined behaviour.
+As a program, it calls the functions of a library many times, for builds that stop at undefined
+behaviour.
 """
 
 from __future__ import annotations
@@ -115,7 +116,8 @@ def make_arguments(symbol: str, seed: int, hard: float) -> tuple[array[int], arr
     )
     integers = [rng.randint(-3, 6) for _ in range(SIZE)]
     if symbol.startswith("pure_bezier_"):
-        # These functions take indices of coefficients: the first index, a stride, and a number of iterations.
+        # These functions take indices of coefficients: the first index, a stride, and a number of
+        # iterations.
         integers[:3] = 0, 1, 3
     return array("q", integers), array("d", floats)
 

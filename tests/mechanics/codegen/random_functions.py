@@ -1,7 +1,8 @@
 """Random functions in the restricted Python of kernels, from a seed.
 
-They contain all constructs except those whose results differ between the languages by intent: powers of floats, which
-compiled code computes as products, and the sign of an integer zero, which exists in JavaScript.
+They contain all constructs except those whose results differ between the languages by intent:
+powers of floats, which compiled code computes as products, and the sign of an integer zero, which
+exists in JavaScript.
 """
 
 from __future__ import annotations

@@ -106,7 +106,8 @@ def take_root(a: float) -> float:
     return a // 2.0
 
 
-# Function: part of the error message, and number of derivative directions with which it is translated.
+# Function: part of the error message, and number of derivative directions with which it is
+# translated.
 REFUSED = {
     list_numbers: (r"\[0\.0\]", 0),
     repeat_else: ("for k in range", 0),

@@ -84,8 +84,8 @@ class PowersAsCalls(ast.NodeTransformer):
 def powers_by_products(wrapped, monkeypatch):
     """Make the functions compute integer powers by products when they run as Python.
 
-    Python rounds such a power once, compiled code after each product. Iterative searches amplify this difference in the
-    last bit beyond any tolerance.
+    Python rounds such a power once, compiled code after each product. Iterative searches amplify
+    this difference in the last bit beyond any tolerance.
     """
     functions = {part for function in wrapped for part in collect_functions(function)}
     for function in functions:

@@ -1,7 +1,7 @@
 """Tests of the digest that decides when a law is compiled anew.
 
-A law is compiled anew when its code, a function that it calls, or a number that it uses changes, but not for comments
-and layout.
+A law is compiled anew when its code, a function that it calls, or a number that it uses changes,
+but not for comments and layout.
 """
 
 from __future__ import annotations

@@ -18,12 +18,13 @@ def contact_forces(
 ) -> tuple[list[tuple[float, float, float]], float]:
     """Compute the forces and the energy of all contacts of one HuntCrossleyForce.
 
-    Contacts do not influence each other, unless Simbody's defect is reproduced. There, the first contact that separates
-    too fast to push ends the computation of this HuntCrossleyForce: the contacts after it lose their force and their
-    energy.
+    Contacts do not influence each other, unless Simbody's defect is reproduced. There, the first
+    contact that separates too fast to push ends the computation of this HuntCrossleyForce: the
+    contacts after it lose their force and their energy.
 
     Args:
-        contacts: one tuple per contact, in the order of `simbody_pair_order`, which matters for the defect only.
+        contacts: one tuple per contact, in the order of `simbody_pair_order`, which matters for the
+            defect only.
         vt: transition velocity of the HuntCrossleyForce (m/s).
         simbody_early_return: reproduce the defect, for comparisons with OpenSim.
 
@@ -49,17 +50,19 @@ def simbody_pair_order(
 ) -> list[tuple[int, int]]:
     """Return pairs of surfaces of one HuntCrossleyForce that may touch, in the order in which Simbody treats them.
 
-    Simbody sweeps along the axis of ground on which the centres lie farthest apart (largest sum of distances from their
-    mean), starting from the surface that begins first, and drops pairs whose bounding spheres are apart. Pairs on the
-    same body are included: their force has no effect, but OpenSim counts their energy.
+    Simbody sweeps along the axis of ground on which the centres lie farthest apart (largest sum of
+    distances from their mean), starting from the surface that begins first, and drops pairs whose
+    bounding spheres are apart. Pairs on the same body are included: their force has no effect, but
+    OpenSim counts their energy.
 
     Args:
-        centres: centre of each surface in ground (m), in the order of the file; the origin of its frame for a half
-            space.
+        centres: centre of each surface in ground (m), in the order of the file; the origin of its
+            frame for a half space.
         radii: radius of each sphere (m); `inf` for a half space.
 
     Returns:
-        Pairs (surface 1, surface 2) of indices. A half space is always surface 1, and two half spaces make no pair.
+        Pairs (surface 1, surface 2) of indices. A half space is always surface 1, and two half
+        spaces make no pair.
     """
     n = len(centres)
     spread = []

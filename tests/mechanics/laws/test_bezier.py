@@ -40,8 +40,8 @@ def test_values_slopes_and_integrals(fixtures):
             if result["dy"]:
                 assert slope == pytest.approx(result["dy"][index], rel=1e-11, abs=1e-11)
             if result["integral"]:
-                # OpenSim's integral is a spline, least accurate near the ends; for compression it starts at the other
-                # end.
+                # OpenSim's integral is a spline, least accurate near the ends; for compression it
+                # starts at the other end.
                 own = curve_integral(numbers, x)
                 own = whole - own if "Compressive" in result["curve"] else own
                 assert own == pytest.approx(result["integral"][index], abs=2e-5)

@@ -30,8 +30,9 @@ PROPERTIES = (
 def test_every_row_of_opensims_table(fixtures):
     """Compare forces to 1e-9 of the sum of the magnitudes of their terms (springs, damper), and energies to 1e-9.
 
-    That sum is the force itself unless the terms cancel; in four rows they cancel to rounding. OpenSim computes one
-    step function as a difference, which loses digits next to the limit (1.6e-10); the rest agrees to 1e-12.
+    That sum is the force itself unless the terms cancel; in four rows they cancel to rounding.
+    OpenSim computes one step function as a difference, which loses digits next to the limit
+    (1.6e-10); the rest agrees to 1e-12.
     """
     with gzip.open(fixtures / "forces" / "coordinate_limit_table.csv.gz", "rt") as text:
         rows = list(csv.DictReader(line for line in text if not line.startswith("#")))

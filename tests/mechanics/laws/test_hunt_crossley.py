@@ -328,7 +328,8 @@ def test_power_is_lost_and_never_made(contact, vt):
     elastic = k * d * sqrt(R * k * d)
     power = dot(force, v) - 4.0 / 3.0 * elastic * dot(v, n)
     scale = abs(dot(force, v)) + elastic * math.hypot(*v)
-    # If the slip is only a rounding error of v, friction has v / vt times the relative rounding error.
+    # If the slip is only a rounding error of v, friction has v / vt times the relative rounding
+    # error.
     assert power >= -1e-10 * scale
 
 
@@ -413,8 +414,8 @@ def test_the_law_knows_no_frame(contact, vt, angle):
 def test_point_of_application_divides_the_overlap(o, n, c, r, a):
     d, P = half_space_sphere(o, n, c, r, a)
     if d > 0.0:
-        # The fraction a of the depth is on the half space's side of the point, the rest between it and the sphere's
-        # pole.
+        # The fraction a of the depth is on the half space's side of the point, the rest between it
+        # and the sphere's pole.
         assert dot([p - q for p, q in zip(P, o, strict=True)], n) == pytest.approx(-a * d, abs=1e-9)
         pole = [x - r * y for x, y in zip(c, n, strict=True)]
         assert math.dist(P, pole) == pytest.approx((1 - a) * d, abs=1e-9)

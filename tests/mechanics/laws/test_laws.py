@@ -52,8 +52,8 @@ def laws():
         function = pending.pop()
         if function not in result:
             result.add(function)
-            # Names of attributes are among these, but no function has such a name; disassembling all kernels takes a
-            # hundred times as long.
+            # Names of attributes are among these, but no function has such a name; disassembling
+            # all kernels takes a hundred times as long.
             pending += [
                 value
                 for value in map(function.__globals__.get, function.__code__.co_names)

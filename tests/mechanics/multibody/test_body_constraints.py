@@ -19,8 +19,8 @@ from tests.suite import choose
 def test_equations_are_the_derivatives_of_the_errors(case: Case, kind, seed):
     """Compare constraint equations with differences along any motion.
 
-    Position errors change at G u - b, and velocity errors at G udot - d. For coincident points, rates are seen from the
-    first body, and changes of rates from the body that carries both.
+    Position errors change at G u - b, and velocity errors at G udot - d. For coincident points,
+    rates are seen from the first body, and changes of rates from the body that carries both.
     """
     assume(len(case.q))
     mechanism, q, u, udot = case
@@ -79,7 +79,8 @@ def test_assembled_states_fulfil_the_constraints_or_are_refused(case: Case, kind
     assert np.abs(constraint.position_errors(state)).max() < 1e-10
     rows, wanted = constraint.velocity_equations(state)
     free = solve_with_null_space(rows, wanted)[1]
-    # Constraints do no other work: changes of speeds (relative above 1) and missing forces lie in the rows of G.
+    # Constraints do no other work: changes of speeds (relative above 1) and missing forces lie in
+    # the rows of G.
     change = (u - case.u) / np.maximum(np.abs(case.u), 1.0) ** 2
     assert free.T @ change == pytest.approx(
         np.zeros(free.shape[1]), abs=1e-9 * (1.0 + np.abs(u).max())

@@ -211,7 +211,8 @@ def test_bodies_come_breadth_first_and_coordinates_in_the_order_of_joints():
 
 def test_coordinates_left_out_are_opensims():
     model = Model(name="m")
-    # This is the state after reading a file; Model.add would name the coordinates after their joint.
+    # This is the state after reading a file; Model.add would name the coordinates after their
+    # joint.
     model.joint_set.objects.append(FreeJoint(name="free").between(model.ground, _body(model, "b")))
     coordinates = load("joint_defaults.json")["FreeJoint"]["coordinates"]
     for info, listed in zip(build_mechanism(model).coordinates, coordinates, strict=True):

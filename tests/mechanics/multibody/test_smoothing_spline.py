@@ -10,7 +10,8 @@ from osimlite.mechanics.multibody.smoothing_spline import derivatives_of_samples
 X = (0.0, 0.3, 0.5, 1.1, 1.2, 1.9, 2.4, 2.5, 3.1, 3.3)
 Y = (0.1, 0.5, 0.4, 1.2, 1.0, 0.3, -0.4, -0.5, -0.2, 0.3)
 
-# Value, first and second derivative in OpenSim 4.6 at 0.0, 0.77 and 3.3, by half order and error variance.
+# Value, first and second derivative in OpenSim 4.6 at 0.0, 0.77 and 3.3, by half order and error
+# variance.
 OPENSIM = {
     (1, 0.0): (
         (0.1, 1.333333333333, 0),
@@ -97,8 +98,9 @@ def test_it_goes_through_the_points_and_is_natural(half_order, count, seed):
 def test_it_is_opensims(case):
     half_order, error_variance = case
     spline = smoothing_spline(X, Y, half_order, error_variance)
-    # The search for the smoothing parameter ends near OpenSim's. Degree 7 with unequal knots loses digits: against a
-    # computation with sixty digits the error is 1.1e-11 on one processor, and less than 1e-11 on others.
+    # The search for the smoothing parameter ends near OpenSim's. Degree 7 with unequal knots loses
+    # digits: against a computation with sixty digits the error is 1.1e-11 on one processor, and
+    # less than 1e-11 on others.
     exact = 1e-11 if half_order < 4 else 1e-10
     tolerance = exact if error_variance == 0.0 else 2e-5
     for x, expected in zip((0.0, 0.77, 3.3), OPENSIM[case], strict=True):

@@ -19,7 +19,8 @@ from tests.simple_models import make_slide
 FOLDER = Path(__file__).resolve().parents[3] / "fixtures" / "muscles"
 # Class and properties of the muscle of each case, from which the tables were computed.
 CONFIGURATIONS: dict[str, Any] = json.loads((FOLDER / "configurations.json").read_text())
-# Values of the properties NAMES for cases that do not set them (N, m, m, rad, optimal fiber lengths per s).
+# Values of the properties NAMES for cases that do not set them (N, m, m, rad, optimal fiber lengths
+# per s).
 USUAL = {"F": 546.0, "lo": 0.0535, "lt": 0.272, "pen": 0.1, "v": 10.0}
 NAMES = {
     "F": "max_isometric_force",

@@ -156,7 +156,8 @@ def test_a_motion_may_start_in_equilibrium():
         fiber = trajectory.auxiliary[path][0]
         engine, rest = simulation.engine, simulation.initial_state(resting, {}, equilibrate=True)
         assert rest[-1] == fiber and abs(engine.compute_derivative(0.0, rest)[-1]) < 1e-6
-        # An initial fiber length that is set stays, and without the option no equilibrium is computed.
+        # An initial fiber length that is set stays, and without the option no equilibrium is
+        # computed.
         assert (
             simulation.run(0.01, initial={"x": 0.3, path: 0.05}, equilibrate=True).auxiliary[path][
                 0

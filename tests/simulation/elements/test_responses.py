@@ -34,7 +34,8 @@ def jets_of(kind: Any, given: tuple[Any, ...]) -> tuple[list[Any], list[int]]:
         given: arguments of a call of its law.
 
     Returns:
-        Arguments with jets for the inputs and states with responses, and the columns of their derivatives.
+        Arguments with jets for the inputs and states with responses, and the columns of their
+        derivatives.
     """
     changed, count = kind.text.changed_outputs, len(kind.text.changed_outputs)
     names = [

@@ -55,7 +55,8 @@ class Bullet:
     def inertial_frame(self, link: str) -> Array:
         """Return mass centre and principal axes of a link in the root (4, 4).
 
-        Bullet keeps these in double precision; the link frames that it reports passed through single precision.
+        Bullet keeps these in double precision; the link frames that it reports passed through
+        single precision.
         """
         state = self.pb.getLinkState(
             self.body, self.links[link], computeForwardKinematics=1, physicsClientId=self.client

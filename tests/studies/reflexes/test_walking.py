@@ -140,7 +140,8 @@ def test_an_arm_holds_a_weight(arm, tmp_path) -> None:
     ):
         search_parameters(Scenario(arm), tmp_path / "out", generations=1, population=8, resume=True)
     (tmp_path / "out" / "best.par").write_text(text)
-    # The previous best is a candidate of the next generation; a mean beyond the bounds is moved into them.
+    # The previous best is a candidate of the next generation; a mean beyond the bounds is moved
+    # into them.
     text = (tmp_path / "out" / "best.par").read_text().split("\n", 1)
     name, best, _, std = text[0].split()
     (tmp_path / "out" / "best.par").write_text(f"{name} {best} -5 {std}\n{text[1]}")

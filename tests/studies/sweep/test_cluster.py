@@ -255,11 +255,13 @@ def test_a_scheduler_that_goes_is_told_and_nothing_is_lost(
 
         import distributed
 
-        # Workers start slowly on a busy machine; only the wait for a scheduler that has ended is short.
+        # Workers start slowly on a busy machine; only the wait for a scheduler that has ended is
+        # short.
         with distributed.Client(lost.address, set_as_default=False) as client:
             client.wait_for_workers(1, timeout=120)
         monkeypatch.setattr("osimlite.base.pools.CLUSTER_TIMEOUT_S", 5)
-        # The number of workers is requested after every task, also right after the scheduler was killed.
+        # The number of workers is requested after every task, also right after the scheduler was
+        # killed.
         monkeypatch.setattr("osimlite.base.pools.WORKER_COUNT_AGE_S", 0.0)
         with pytest.raises(OsimliteError, match="does not answer any more; continue with --resume"):
             sweep(made, chosen, tmp_path / "r.parquet", cluster=lost.address, progress=end)

@@ -21,8 +21,8 @@ def compare_errors(folder: Path) -> tuple[np.ndarray, list[tuple[float, float]]]
     """Run the inverse kinematics of a lab, and check the trial.
 
     Returns:
-        Marker errors (t, m) in cm; root mean square and largest error in cm of the summary of the run, of the
-        table that it writes, and of the check of the trial.
+        Marker errors (t, m) in cm; root mean square and largest error in cm of the summary of the
+        run, of the table that it writes, and of the check of the trial.
     """
     outcome = run(folder / "ik.xml")
     table = outcome.tables["ik_ik_marker_errors.sto"]

@@ -166,7 +166,8 @@ def chain(*forces) -> Model:
     return model
 
 
-# Names that are reserved, equal after cleaning, invalid in XML, or similar to names that the export adds.
+# Names that are reserved, equal after cleaning, invalid in XML, or similar to names that the export
+# adds.
 HOSTILE = (
     "", "world", "ground", "World", "a", "A", " a", "a ", "a\tb", "a\nb", "a\r\nb", "a b", "a  b", "a/b", "a.b", "/a",
     ".", "..", "a\x0bb", "a\x00b", "a\ud800", "\ufffe", 'a"b', "a'b", "<a>", "&amp;", "&#10;", "é", "e\u0301", "\u00a0",

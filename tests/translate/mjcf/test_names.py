@@ -42,7 +42,8 @@ def test_mujoco_takes_models_with_any_names(names: list[str]) -> None:
     try:
         mjcf = osimlite.to_mjcf(hostile(names))
     except osimlite.OsimliteError as refusal:
-        # A PathWrap refers to its surface by a name without slashes, and without spaces at its ends.
+        # A PathWrap refers to its surface by a name without slashes, and without spaces at its
+        # ends.
         assert "wrap_object" in str(refusal)
         return
     compiled = mujoco.MjModel.from_xml_string(mjcf.text, mjcf.files)

@@ -10,8 +10,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-# OpenSim's wheel contains a CasADi, which cannot be loaded after another one. Import OpenSim here, so that it is loaded
-# while tests are collected, before any of them runs.
+# OpenSim's wheel contains a CasADi, which cannot be loaded after another one. Import OpenSim here,
+# so that it is loaded while tests are collected, before any of them runs.
 with contextlib.suppress(ImportError):
     import opensim  # noqa: F401
 

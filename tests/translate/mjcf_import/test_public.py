@@ -1,7 +1,7 @@
 """Tests of public MuJoCo models, converted and compared in osimlite and in OpenSim at 100 random poses.
 
-The models are not part of the repository. Clone MyoHub/myo_sim as ``myo_sim`` and google-deepmind/mujoco as ``mujoco``
-into a folder, and name it in OSIMLITE_PUBLIC_MODELS.
+The models are not part of the repository. Clone MyoHub/myo_sim as ``myo_sim`` and
+google-deepmind/mujoco as ``mujoco`` into a folder, and name it in OSIMLITE_PUBLIC_MODELS.
 """
 
 from __future__ import annotations

@@ -26,7 +26,8 @@ def there_and_back(model, folder):
         folder: folder of the files.
 
     Returns:
-        Model after both translations, and a function that returns values of its coordinates for those of the original.
+        Model after both translations, and a function that returns values of its coordinates for
+        those of the original.
     """
     translated = osimlite.to_mjcf(model, visuals=False)
     file = translated.write(folder)[0]

@@ -134,7 +134,8 @@ def test_muscles_have_fitted_curves(made, records):
     assert type(muscle).__name__ == "Millard2012EquilibriumMuscle"
     assert muscle.ignore_tendon_compliance and not muscle.ignore_activation_dynamics
     assert (muscle.activation_time_constant, muscle.deactivation_time_constant) == (0.015, 0.06)
-    # The tendon slack length must be positive; the optimal fiber length is reduced by the difference.
+    # The tendon slack length must be positive; the optimal fiber length is reduced by the
+    # difference.
     fiber, slack = 0.2 / 0.7, 0.15 - 0.6 * 0.2 / 0.7
     assert slack < 0.0 < muscle.tendon_slack_length == 1e-4
     assert muscle.optimal_fiber_length == pytest.approx(fiber + slack - 1e-4)

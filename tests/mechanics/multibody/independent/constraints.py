@@ -121,7 +121,8 @@ def rolling(constraint: b.RollingConstraint, state: Moved) -> Bond:
 def slips(constraint: b.RollingConstraint, state: Moved) -> list[Bond]:
     """Return the no-slip equations of rolling.
 
-    The material point of the roller at the foot moves with the surface; its station in the roller changes.
+    The material point of the roller at the foot moves with the surface; its station in the roller
+    changes.
     """
     surface, roller = constraint.surface, constraint.roller
     centre, foot = (
@@ -179,9 +180,9 @@ def station(state: Moved, place: StationPlacement) -> MovingVector:
 def meeting(state: Moved, first: StationPlacement, second: StationPlacement) -> MovingVector:
     """Return the vector from one station to another.
 
-    Its rate is the velocity of the second station relative to the coincident point of the first body. Simbody keeps
-    this velocity at zero: the rate of the vector as seen from the first body, and its change as seen from the body that
-    carries both.
+    Its rate is the velocity of the second station relative to the coincident point of the first
+    body. Simbody keeps this velocity at zero: the rate of the vector as seen from the first body,
+    and its change as seen from the body that carries both.
     """
     end = station(state, second)
     body = first.body

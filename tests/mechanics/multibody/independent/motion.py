@@ -139,7 +139,8 @@ def curvature(error: SimbodyAccelerationError, q: Array) -> Array:
         rotation = rotation @ rotation_about(turn.axis, amount)
     along, curvature = np.array(axes).T, np.zeros((3, count, count))
     for row in (1, 2):
-        # Rate of this axis (3, k) by the rates that Simbody uses for the preceding angles, minus the correct one.
+        # Rate of this axis (3, k) by the rates that Simbody uses for the preceding angles, minus
+        # the correct one.
         theirs = np.zeros((3, count))
         theirs[:, :row] = along @ shares[:, :row]
         wrong = -skew_matrix(axes[row]) @ (theirs - along[:, :row] @ shares[:row])
@@ -156,9 +157,9 @@ def turned(rotation: Array, block: Array) -> Array:
 class RelativeMotion:
     """Pose and motion of frame B relative to frame A under k generalized speeds, expressed in A.
 
-    The columns of `block` (6, k + 2) are spatial vectors: the Jacobian of the k speeds, the velocity, and the part of
-    the acceleration that does not depend on the derivatives of the speeds. Composition of motions treats all of them
-    nearly alike, so they share one array.
+    The columns of `block` (6, k + 2) are spatial vectors: the Jacobian of the k speeds, the
+    velocity, and the part of the acceleration that does not depend on the derivatives of the
+    speeds. Composition of motions treats all of them nearly alike, so they share one array.
     """
 
     rotation: Array

@@ -1,7 +1,7 @@
 """Tests of settings that make Bullet compute correct mechanics in spite of its defaults.
 
-Every test shows both: the result is right, and it is wrong without the correction. Corrections in the URDF file are
-tested with the URDF writer.
+Every test shows both: the result is right, and it is wrong without the correction. Corrections in
+the URDF file are tested with the URDF writer.
 """
 
 from __future__ import annotations
@@ -227,7 +227,8 @@ def test_nothing_collides(mechanism):
 
 
 def test_worlds_are_left(mechanism):
-    # Collect engines of earlier tests now, because collecting them during this test would change the count.
+    # Collect engines of earlier tests now, because collecting them during this test would change
+    # the count.
     gc.collect()
     before = bullet.getConnectionInfo(0)["isConnected"]
     for _ in range(30):
