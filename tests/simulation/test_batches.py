@@ -1,4 +1,4 @@
-"""Tests of batches of runs: results equal single runs on any number of threads; events, reports, failures."""
+"""Tests of batches of runs: results equal single runs on any number of threads; conditions that end a run, reports, failures."""
 
 from __future__ import annotations
 

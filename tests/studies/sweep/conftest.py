@@ -1,4 +1,4 @@
-"""Requirements of the tests of sweeps."""
+"""Skip the tests of sweeps where pyarrow or SciPy is not installed."""
 
 from __future__ import annotations
 
