@@ -275,8 +275,8 @@ def _describe_wrong_number(error: BaseException, words: Sequence[str]) -> str:
     for index, word in reversed([*enumerate(words)]):
         option, has_value, value = word.partition("=")
         if expected and option in options:
-            found = value if has_value else next(iter(words[index + 1 :]), "")
-            return f"{option}: expected {expected[0]}, found '{found}'"
+            option_value = value if has_value else next(iter(words[index + 1 :]), "")
+            return f"{option}: expected {expected[0]}, found '{option_value}'"
     return ""
 
 

@@ -19,7 +19,7 @@ from osimlite.mechanics.kernels.constrained_dynamics import (
 )
 from osimlite.mechanics.kernels.dynamics import evaluate, solve_accelerations
 from osimlite.mechanics.kernels.layout import CONSTRAINED, CONSTRAINT, DOF, MODEL, OUTCOME, STAGE
-from osimlite.mechanics.kernels.linear_algebra import REDUNDANT
+from osimlite.mechanics.kernels.linear_algebra import REDUNDANCY_TOLERANCE
 from osimlite.mechanics.kernels.pointers import Law
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
@@ -115,15 +115,15 @@ def _select_independent_rows(rows: Array) -> list[int]:
     lengths = np.linalg.norm(rows, axis=1)
     remainders = (
         rows
-        / np.where(lengths > REDUNDANT * max(lengths.max(initial=0.0), 1.0), lengths, np.inf)[
-            :, None
-        ]
+        / np.where(
+            lengths > REDUNDANCY_TOLERANCE * max(lengths.max(initial=0.0), 1.0), lengths, np.inf
+        )[:, None]
     )
     selected: list[int] = []
     for _ in range(min(rows.shape)):
         remaining_lengths = np.linalg.norm(remainders, axis=1)
         pivot = int(np.argmax(remaining_lengths))
-        if remaining_lengths[pivot] < REDUNDANT:
+        if remaining_lengths[pivot] < REDUNDANCY_TOLERANCE:
             break
         selected.append(pivot)
         direction = remainders[pivot] / remaining_lengths[pivot]

@@ -104,7 +104,8 @@ class SymbolicPath:
         # The records of a FunctionBasedPath, in which two kernels are replaced by these functions.
         part_records = [ForceRecord("pull_coordinates", is_part=True), length_record, speed_record]
         record_distances = [
-            sum(ITEM.OWN + len(item.ints) for item in part_records[first:]) for first in range(3)
+            sum(ITEM.DETAILS + len(item.ints) for item in part_records[first:])
+            for first in range(3)
         ]
         ints = (
             record_distances[0],

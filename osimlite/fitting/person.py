@@ -398,11 +398,13 @@ class _PersonFit:
         np.fill_diagonal(matrix[self._sizes :, self._sizes :], prior_weights)
         slope[self._sizes :] = prior_weights * movable_offsets.ravel()
         for frame, jacobian in enumerate(estimate.posed.compute_marker_jacobians(values)):
-            is_seen = is_measured[frame]
-            scaled = roots[is_seen, None, None]
-            rows = (scaled * derivatives[frame, is_seen]).reshape(-1, size)
+            is_visible = is_measured[frame]
+            scaled = roots[is_visible, None, None]
+            rows = (scaled * derivatives[frame, is_visible]).reshape(-1, size)
             # Errors that a change of the pose removes do not count: project them out.
-            pose_derivatives = (scaled * jacobian[is_seen]).reshape(len(rows), jacobian.shape[-1])
+            pose_derivatives = (scaled * jacobian[is_visible]).reshape(
+                len(rows), jacobian.shape[-1]
+            )
             # Orthonormal directions in which a change of the pose moves the markers.
             squares, axes = np.linalg.eigh(pose_derivatives.T @ pose_derivatives)
             # Directions in which the markers do not move are rounding errors.
@@ -410,5 +412,5 @@ class _PersonFit:
             directions = pose_derivatives @ (axes[:, certain] / np.sqrt(squares[certain]))
             remaining_rows = rows - directions @ (directions.T @ rows)
             matrix += remaining_rows.T @ remaining_rows
-            slope += rows.T @ (roots[is_seen, None] * errors[frame][is_seen]).ravel()
+            slope += rows.T @ (roots[is_visible, None] * errors[frame][is_visible]).ravel()
         return matrix, slope

@@ -18,7 +18,7 @@ from osimlite.fitting.pose_layout import (
     separate_couplers,
 )
 from osimlite.mechanics.kernels.pointers import Floats, Ints
-from osimlite.mechanics.kernels.pose_fit import STUCK, UNASSEMBLED, UNSEEN
+from osimlite.mechanics.kernels.pose_fit import UNASSEMBLED, UNCONVERGED, UNSEEN
 from osimlite.mechanics.kernels.pose_record import FIT
 from osimlite.mechanics.multibody.constraints import Lock, PrescribedCoordinate
 from osimlite.mechanics.multibody.functions import SmoothFunction
@@ -181,7 +181,7 @@ class PoseFit:
         values[:, self.order] = result[:, :free_count]
         vectors = result[:, free_count:-3].reshape(count, -1, 3)
         unseen, unsettled = (
-            tuple(np.flatnonzero(status == code).tolist()) for code in (UNSEEN, STUCK)
+            tuple(np.flatnonzero(status == code).tolist()) for code in (UNSEEN, UNCONVERGED)
         )
         positions = vectors[:, : self.markers]
         rotations = vectors[:, self.markers :]

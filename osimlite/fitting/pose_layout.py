@@ -10,7 +10,7 @@ from osimlite.base.records import dataclass
 from osimlite.mechanics.kernels.layout import CONSTRAINED, LINK, MODEL, MOTION, OPERATION
 from osimlite.mechanics.kernels.linear_algebra import factor_size
 from osimlite.mechanics.kernels.pointers import Floats, Ints
-from osimlite.mechanics.kernels.pose_fit import POSES
+from osimlite.mechanics.kernels.pose_fit import PREVIOUS_POSES
 from osimlite.mechanics.kernels.pose_record import FIT, FREEDOM
 from osimlite.mechanics.multibody.constraints import ConstraintEquations, Coupler
 from osimlite.mechanics.multibody.function_tables import function_table
@@ -197,7 +197,7 @@ class FitLayout:
                     default=0,
                 ),
             ),
-            FIT.HISTORY: 2 + (POSES + 2) * size,
+            FIT.HISTORY: 2 + (PREVIOUS_POSES + 2) * size,
             FIT.TRIAL: 2 * size,
             FIT.STEP: size,
             FIT.CURVES: (size * size + equations) * (equations > 0),

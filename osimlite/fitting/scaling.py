@@ -20,7 +20,7 @@ from osimlite.mechanics.multibody.spatial import Array, rotation_xyz
 from osimlite.schema.base import Component
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.custom_joint import SpatialTransform
-from osimlite.schema.facts import ACROSS, ALONG, AXES, HOLDER, MEAN, OWN, PATH, Facts
+from osimlite.schema.facts import ACROSS, ALONG, AXES, HOLDER, MEAN, PATH, SELF, Facts
 from osimlite.schema.frames import Body, PhysicalFrame
 from osimlite.schema.functions import Function, LinearFunction, MultiplierFunction
 from osimlite.schema.joints import Joint
@@ -220,7 +220,7 @@ class _Scaler:
                 continue
             if is_a(component, "CoordinateCouplerConstraint"):
                 factors = self._get_coupler_factors(component, frame_source)
-            elif frame_source == OWN:
+            elif frame_source == SELF:
                 assert isinstance(component, PhysicalFrame)
                 factors = self.get_base_factors(component)
             elif frame_source == HOLDER:

@@ -150,31 +150,31 @@ def select_edits(findings: Iterable[Finding], *, unsafe: bool = False) -> tuple[
     Returns:
         The edits sorted by position, and the number of fixes.
     """
-    chosen: list[Edit] = []
+    selected: list[Edit] = []
     count = 0
     for finding in findings:
         fix = finding.fix
         if fix is None or not (fix.safe or unsafe):
             continue
         # Of overlapping fixes the first wins; a second run of the fixes applies the others.
-        if any(_overlaps_any(edit, chosen) for edit in fix.edits):
+        if any(_overlaps_any(edit, selected) for edit in fix.edits):
             continue
         for edit in fix.edits:
-            insort(chosen, edit, key=_get_start)
+            insort(selected, edit, key=_get_start)
         count += 1
-    return chosen, count
+    return selected, count
 
 
 def _get_start(edit: Edit) -> int:
     return edit.start
 
 
-def _overlaps_any(edit: Edit, chosen: list[Edit]) -> bool:
+def _overlaps_any(edit: Edit, selected: list[Edit]) -> bool:
     """Return whether an edit overlaps one of some sorted, disjoint edits."""
     # The edits are disjoint and sorted, so only the last one that starts before this edit's end can
     # overlap it.
-    before = bisect_left(chosen, edit.end, key=_get_start)
-    return before > 0 and chosen[before - 1].end > edit.start
+    before = bisect_left(selected, edit.end, key=_get_start)
+    return before > 0 and selected[before - 1].end > edit.start
 
 
 def apply_fixes(source: Source, report: Report, *, unsafe: bool = False) -> tuple[bytes, int]:

@@ -13,7 +13,7 @@ from osimlite.base.files import make_missing_error, read_at_most, unsaved
 from osimlite.base.patterns import compile_later
 from osimlite.errors import OsimliteError
 
-BEGINNING = 1 << 16
+BEGINNING_BYTES = 1 << 16
 """Number of bytes at the beginning of a file that decide whether it is OpenSim's."""
 
 _ROOT = compile_later(r"<(?:[\w.-]+:)?OpenSimDocument\b")
@@ -191,7 +191,7 @@ def is_opensim_file(file: str) -> bool:
     if not file.lower().endswith(".xml"):
         return True
     try:
-        return is_opensim_xml(read_at_most(file, BEGINNING))
+        return is_opensim_xml(read_at_most(file, BEGINNING_BYTES))
     # An unreadable file is reported by the check, not skipped.
     except OsimliteError:
         return True

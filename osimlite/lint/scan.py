@@ -96,14 +96,14 @@ class TableRows:
         return jump[1] + row - jump[0]
 
 
-BLOCK = 16_000
+BLOCK_BYTES = 16_000
 """Number of bytes that are examined together: few enough for the cache of a processor."""
 
-_LONGEST = 4_000_000
+_MAX_LINE_BYTES = 4_000_000
 """Length of a line, in bytes, above which recognising its shape would take too much memory."""
-_SAMPLES = 64
+_SAMPLED_ROWS = 64
 """Number of rows at the beginning that are all samples; later rows are sampled ever more sparsely."""
-_SAMPLED = 200_000
+_MAX_SAMPLED_NUMBERS = 200_000
 """Largest total of numbers in these rows."""
 # Python's float() also accepts underscores, which C++ does not, and NaN and infinity, which count
 # as missing here.
@@ -157,7 +157,7 @@ class RowScanner:
             lines.pop()
             shapes, zeros = (
                 _compute_shapes(block, layout)
-                if len(block) < _LONGEST
+                if len(block) < _MAX_LINE_BYTES
                 # A line of several megabytes would need tables of shapes of many times its size;
                 # "!" sends it to the examination cell by cell.
                 else (b"!\n" * len(lines), False)
@@ -275,9 +275,9 @@ class RowScanner:
 
     def _count_missing_samples(self) -> int:
         """Return the number of further rows that become samples."""
-        return max(2, min(_SAMPLES, _SAMPLED // max(1, self.cells * self.parts))) - len(
-            self.rows.samples
-        )
+        return max(
+            2, min(_SAMPLED_ROWS, _MAX_SAMPLED_NUMBERS // max(1, self.cells * self.parts))
+        ) - len(self.rows.samples)
 
     def _read_numbers(self, text: bytes, read: Callable[[bytes], float]) -> list[float]:
         """Return the numbers of a row; NaN for other cells."""
@@ -467,7 +467,7 @@ def _split_blocks(data: bytes, start: int) -> Iterator[bytes]:
     while start < size:
         end = (
             # A line longer than a block becomes a block of its own.
-            data.rfind(b"\n", start, min(start + BLOCK, size)) + 1
+            data.rfind(b"\n", start, min(start + BLOCK_BYTES, size)) + 1
             or data.find(b"\n", start, size) + 1
             or size
         )

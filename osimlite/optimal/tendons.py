@@ -9,7 +9,7 @@ from osimlite.derivatives.symbolic import make_symbolic
 from osimlite.derivatives.symbols import casadi
 from osimlite.mechanics.laws.muscles import MuscleInputs
 from osimlite.mechanics.laws.smooth_muscles import (
-    BELOW,
+    TENDON_FORCE_OFFSET,
     SmoothMuscle,
     SmoothTendon,
     degroote_active,
@@ -90,7 +90,9 @@ class TendonEquations:
             )
             # Derivative of the tendon's length, the inverse of its exponential force curve, times
             # the rate of the force.
-            tendon_speed = muscle.slack * rates[number] / (tendon.growth * (force + BELOW))
+            tendon_speed = (
+                muscle.slack * rates[number] / (tendon.growth * (force + TENDON_FORCE_OFFSET))
+            )
             muscle_inputs = (
                 lengths[path_index],
                 speeds[path_index] - tendon_speed,
@@ -130,7 +132,7 @@ class TendonEquations:
             # Pennate fibers keep their height normal to the tendon.
             length = casadi.sqrt(fiber_along_tendon**2 + muscle.height**2)
             fiber_speed = speeds[path_index] - muscle.slack * rate / (
-                tendon.growth * (force + BELOW)
+                tendon.growth * (force + TENDON_FORCE_OFFSET)
             )
             velocity = casadi.SX.sym("velocity")
             active = activation * make_symbolic(degroote_active)(

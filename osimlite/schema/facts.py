@@ -27,7 +27,7 @@ UP_TO_QUARTER_TURN: Final = "0 to 1.5707963267948966"
 LEAST_TIME_CONSTANT: Final = "> 2.0097183471152322e-14"
 """In seconds: OpenSim refuses time constants up to SimTK::SignificantReal."""
 
-OWN, HOLDER, PATH = "own", "holder", "path"
+SELF, HOLDER, PATH = "own", "holder", "path"
 MEAN, ALONG, ACROSS, AXES = "mean", "along", "across", "axes"
 
 Contradiction = tuple[str | None, str]
@@ -61,7 +61,7 @@ class Facts(NamedTuple):
             MuJoCo's names (vmax, fvmax) or rise and fall, the time constants. A dot leads into the
             object that a property holds. Missing entries are taken from the base.
         scales: factors by which scaling a model multiplies numbers, by property. A factor is that
-            of a body along its axes: OWN of the frame itself, HOLDER of the frame that holds the
+            of a body along its axes: SELF of the frame itself, HOLDER of the frame that holds the
             object, or that of a socket or coordinate, followed by the axis (x, y, z; MEAN; ALONG and ACROSS
             the Z axis of a surface; AXES for all three). PATH is the ratio of path lengths, and an
             empty text stands for no scaling. Missing entries are taken from the base.

@@ -4,7 +4,7 @@ import math
 from typing import Annotated
 
 from osimlite.schema.base import ModelComponent, make_default, make_empty_list
-from osimlite.schema.facts import OWN, Facts
+from osimlite.schema.facts import SELF, Facts
 from osimlite.schema.fields import (
     LegacyMany,
     Many,
@@ -29,7 +29,7 @@ class Frame(ModelComponent, abstract=True):
     facts = Facts(
         outputs="acceleration:SpatialVec angular_acceleration:Vec3 angular_velocity:Vec3 linear_acceleration:Vec3 "
         "linear_velocity:Vec3 position:Vec3 rotation:Rotation transform:Transform velocity:SpatialVec",
-        scales={"attached_geometry": OWN},
+        scales={"attached_geometry": SELF},
     )
 
     frame_geometry: Single[FrameGeometry] = make_default(FrameGeometry, name="frame_geometry")
@@ -64,7 +64,7 @@ class Body(PhysicalFrame):
         "linear_momentum_about_mass_center:Vec3 linear_momentum_about_origin:Vec3 "
         "momentum_about_mass_center:SpatialVec momentum_about_origin:SpatialVec",
         refused="mass",
-        scales={"mass_center": OWN},
+        scales={"mass_center": SELF},
     )
 
     # The default is NaN so that OpenSim rejects a body without a mass, also one with a misspelt

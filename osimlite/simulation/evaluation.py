@@ -159,7 +159,7 @@ class StateEvaluator:
             return
         self._driven_by = ints, len(numbers), kernel
         self.structure = np.concatenate(
-            (self.structure[: record_offset + ITEM.OWN], np.array(ints, dtype=np.int64))
+            (self.structure[: record_offset + ITEM.DETAILS], np.array(ints, dtype=np.int64))
         )
         self.numbers = np.concatenate(
             (self.numbers[:first_number], np.array(numbers, dtype=np.float64))

@@ -194,7 +194,7 @@ class Packer(LinkPacker):
         self.ints[MODEL.RESPONSES], self.ints[MODEL.RESPONSE_AT] = len(responding), len(self.ints)
         for item_offset, response in responding.items():
             self.responses[len(self.ints)] = response.kernel
-            first_state = ITEM.OWN + response.first_state
+            first_state = ITEM.DETAILS + response.first_state
             self.ints += RESPONSE.record(
                 KERNEL=0,
                 ITEM=item_offset,

@@ -1,7 +1,7 @@
 """Packing of a robot chain whose mass matrix another program computes.
 
 PyBullet computes with joints of one axis. The kernels map the m degrees of freedom of the mechanism
-to the joints: the rates of the joints are v = P u, hence M = Pᵀ M_joints P. A *share* is a nonzero
+to the joints: the rates of the joints are v = P u, hence M = Pᵀ M_joints P. A *derivative* is a nonzero
 entry of P.
 """
 
@@ -17,11 +17,11 @@ from osimlite.mechanics.kernels.layout import (
     DOF,
     EXCESS,
     JOINT,
-    JOINT_KIND,
+    JOINT_DERIVATIVE,
+    JOINT_SOURCE,
     MODEL,
     MOTION,
     PRODUCT,
-    SHARE,
 )
 from osimlite.mechanics.multibody.motions import AccelerationErrorAngle, EllipsoidPoint
 from osimlite.mechanics.multibody.parts import GROUND
@@ -59,18 +59,22 @@ def pack_chain(packer: Packer, chain: Chain) -> None:
     ints += [0] * CHAIN.SIZE
     packer.kernels[start + CHAIN.SUPPLY] = chain.supply
     records: list[int] = []
-    shares: list[tuple[int, int]] = []
+    derivatives: list[tuple[int, int]] = []
     for number, joint in enumerate(chain.joints):
         joint_kind, source, part, freedoms = _encode_joint(packer, joint)
-        records += JOINT.record(KIND=joint_kind, SOURCE=source, PART=part, FIRST_SHARE=len(shares))
-        shares += [(number, freedom) for freedom in freedoms]
-    share_records = [
-        item for joint, freedom in shares for item in SHARE.record(JOINT=joint, DOF=freedom)
+        records += JOINT.record(
+            KIND=joint_kind, SOURCE=source, PART=part, FIRST_DERIVATIVE=len(derivatives)
+        )
+        derivatives += [(number, freedom) for freedom in freedoms]
+    derivative_records = [
+        item
+        for joint, freedom in derivatives
+        for item in JOINT_DERIVATIVE.record(JOINT=joint, DOF=freedom)
     ]
     lists = {
         ("JOINTS", "JOINT_AT"): (JOINT.SIZE, records),
-        ("SHARES", "SHARE_AT"): (SHARE.SIZE, share_records),
-        ("PRODUCTS", "PRODUCT_AT"): (PRODUCT.SIZE, _list_products(packer, shares, count)),
+        ("DERIVATIVES", "DERIVATIVE_AT"): (JOINT_DERIVATIVE.SIZE, derivative_records),
+        ("PRODUCTS", "PRODUCT_AT"): (PRODUCT.SIZE, _list_products(packer, derivatives, count)),
         ("EXCESSES", "EXCESS_AT"): (EXCESS.SIZE, list_excesses(packer, chain.excess)),
     }
     # The four lists follow the head. Each pair of names is a field for its length and one for its
@@ -84,7 +88,7 @@ def pack_chain(packer: Packer, chain: Chain) -> None:
         DYNAMICS=packer.require_law("chain_dynamics"),
         SUPPLY=0,
         WORK_JOINTS=packer.reserve_work((4 + count) * count),
-        WORK_SHARES=packer.reserve_work(len(shares)),
+        WORK_DERIVATIVES=packer.reserve_work(len(derivatives)),
         ENTRY_AT=entries,
         END_ENTRY=entries + packer.entries,
         **list_fields,
@@ -99,7 +103,7 @@ def _encode_joint(packer: Packer, joint: RobotJoint) -> tuple[int, int, int, lis
         joint: a moving joint.
 
     Returns:
-        Kind of the joint (`JOINT_KIND`), source (index of an operation or of a degree of freedom),
+        Kind of the joint (`JOINT_SOURCE`), source (index of an operation or of a degree of freedom),
         part (a component, or the index of a number), and the degrees of freedom that move it.
     """
     function = joint.function
@@ -114,40 +118,40 @@ def _encode_joint(packer: Packer, joint: RobotJoint) -> tuple[int, int, int, lis
         if operation.kind == MOTION.ACCELERATION_ERROR and isinstance(
             function, AccelerationErrorAngle
         ):
-            return JOINT_KIND.ERROR, number, function.component, []
+            return JOINT_SOURCE.ERROR, number, function.component, []
         if is_ball and isinstance(function, EllipsoidPoint):
-            return JOINT_KIND.ELLIPSOID, number, function.component, freedoms
+            return JOINT_SOURCE.ELLIPSOID, number, function.component, freedoms
         if is_ball and len(coordinates) == 1 and coordinates[0] in operation.arguments:
             angles = [packer.link_map.freedom(coordinate) for coordinate in operation.arguments]
-            return JOINT_KIND.ANGLE, number, operation.arguments.index(coordinates[0]), angles
+            return JOINT_SOURCE.ANGLE, number, operation.arguments.index(coordinates[0]), angles
         if operation.function is function and operation.arguments == coordinates:
-            return JOINT_KIND.AMOUNT_OF, number, 0, freedoms
+            return JOINT_SOURCE.AMOUNT_OF, number, 0, freedoms
     # What remains are joints that are the coordinate itself or a multiple of it, as the couplings
     # of `build_robot` make them.
     line = find_line(function)
     assert line is not None and line.offset == 0.0, f"nothing moves '{joint.name}'"
     packer.numbers.append(line.slope)
-    return JOINT_KIND.LINE, freedoms[0], len(packer.numbers) - 1, freedoms
+    return JOINT_SOURCE.LINE, freedoms[0], len(packer.numbers) - 1, freedoms
 
 
-def _list_products(packer: Packer, shares: Sequence[tuple[int, int]], count: int) -> list[int]:
+def _list_products(packer: Packer, derivatives: Sequence[tuple[int, int]], count: int) -> list[int]:
     """Return the records of the products that make the mass matrix of the mechanism.
 
-    Entry (i, j) of Pᵀ M_joints P is a sum over pairs of shares. Only the entries of a degree of
+    Entry (i, j) of Pᵀ M_joints P is a sum over pairs of derivatives. Only the entries of a degree of
     freedom and those above it in the tree are nonzero, so each row is followed up to the root.
 
     Args:
         packer: writer of the kernel vectors.
-        shares: index of the joint and of the degree of freedom for each share.
+        derivatives: index of the joint and of the degree of freedom for each derivative.
         count: number of joints, the size of the other program's matrix.
 
     Returns:
-        Records with both shares, the entry of the other program's matrix, and the offset of the
+        Records with both derivatives, the entry of the other program's matrix, and the offset of the
         sum.
     """
-    shares_of_freedom: dict[int, list[tuple[int, int]]] = defaultdict(list)
-    for number, (joint, freedom) in enumerate(shares):
-        shares_of_freedom[freedom].append((number, joint))
+    derivatives_of_freedom: dict[int, list[tuple[int, int]]] = defaultdict(list)
+    for number, (joint, freedom) in enumerate(derivatives):
+        derivatives_of_freedom[freedom].append((number, joint))
     result: list[int] = []
     freedoms = packer.ints[packer.ints[MODEL.DOF_AT] :]
     for freedom in range(packer.ints[MODEL.DOFS]):
@@ -155,10 +159,10 @@ def _list_products(packer: Packer, shares: Sequence[tuple[int, int]], count: int
         ancestor = freedom
         # Up to the root, whose freedoms have none above: -1.
         while ancestor >= 0:
-            for row_share, i in shares_of_freedom[freedom]:
-                for column_share, j in shares_of_freedom[ancestor]:
+            for row_derivative, i in derivatives_of_freedom[freedom]:
+                for column_derivative, j in derivatives_of_freedom[ancestor]:
                     result += PRODUCT.record(
-                        ONE=row_share, TWO=column_share, ENTRY=count * i + j, TARGET=entry
+                        ONE=row_derivative, TWO=column_derivative, ENTRY=count * i + j, TARGET=entry
                     )
             entry = entry + 1
             ancestor = freedoms[DOF.SIZE * ancestor + DOF.ABOVE]

@@ -10,7 +10,7 @@ import numpy as np
 
 from osimlite.base.lazy import make_notebook_repr
 from osimlite.mechanics.kernels.paths import PATH_WORK
-from osimlite.mechanics.kernels.projection import REDUNDANT
+from osimlite.mechanics.kernels.projection import INDEPENDENCE
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.constraints import ConstraintEquations, Lock
 from osimlite.mechanics.multibody.extremes import any_numbers, methods_of_any_numbers
@@ -341,7 +341,7 @@ def _compute_coupled_speeds(
         # The least-norm correction is subtracted from the unit speed.
         rows, rhs = stack_equations([item.velocity_equations(state) for item in constraints])
         speeds = coupling[:, indices] - solve_least_norm(
-            rows, rows[:, indices] - rhs[:, None], REDUNDANT * len(rows)
+            rows, rows[:, indices] - rhs[:, None], INDEPENDENCE * len(rows)
         )
         driving_speeds = speeds[indices, range(len(indices))]
         # A speed that constraints do not allow has no moment arm (NaN).

@@ -331,7 +331,7 @@ class System(StateEvaluator):
             # optimal force.
             if self.has_quantity(name, STRENGTH):
                 path = item - int(
-                    self.structure[item + ITEM.OWN + self.get_force_type(name).text.int_count]
+                    self.structure[item + ITEM.DETAILS + self.get_force_type(name).text.int_count]
                 )
                 (strength,) = self.find_offsets(name, (STRENGTH,))
             order += item, controls[name], path, strength

@@ -37,7 +37,7 @@ MIN_MUSCLE_BOUND = 0.02
 """Smallest lower bound of a muscle's control."""
 MIN_MUSCLE_UPPER_BOUND = 1.0
 """Smallest upper bound of a muscle's control."""
-TOLERANCE = 4e-3
+CONTROL_TOLERANCE = 4e-3
 """Tolerance of the controls."""
 MIN_FORCE_RANGE = 1.0
 """Smallest range of an actuator's force (N or N m); below it, the control is the lower bound."""
@@ -358,7 +358,7 @@ class ComputedControl:
                 lambda trial_controls: self._predict_forces(t, target, z, trial_controls) - forces,
                 lower,
                 upper,
-                TOLERANCE,
+                CONTROL_TOLERANCE,
             )
         else:
             # Without states the forces are proportional to the controls.

@@ -70,9 +70,9 @@ def _create_frame_reader(quantity: str) -> Reader:
 
     def read_frame(motion: Motion, frame: Frame, path: str) -> Array:
         """Return the quantity of a frame (t, k) in ground."""
-        body, placed = motion.mechanism.placement(path)
+        body, frame_in_body = motion.mechanism.placement(path)
         turning = motion.links.get_angular_motion(body)
-        moving = motion.links.compute_point_motion(body, placed[:3, 3])
+        moving = motion.links.compute_point_motion(body, frame_in_body[:3, 3])
         return {
             "position": lambda: moving[0],
             "angular_velocity": lambda: turning[0],
@@ -100,8 +100,10 @@ def _create_station_reader(derivative_order: int) -> Reader:
             # In OpenSim the location of a path point belongs to a station inside it.
             station = holder
         frame = tree.target(station, "socket_parent_frame", station.socket_parent_frame)
-        body, placed = motion.mechanism.placement(tree.path_of(frame) or "")
-        point = placed[:3, :3] @ np.array(station.location, dtype=float) + placed[:3, 3]
+        body, frame_in_body = motion.mechanism.placement(tree.path_of(frame) or "")
+        point = (
+            frame_in_body[:3, :3] @ np.array(station.location, dtype=float) + frame_in_body[:3, 3]
+        )
         return motion.links.compute_point_motion(body, point)[derivative_order]
 
     return read_station

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from osimlite.base.records import dataclass
-from osimlite.mechanics.kernels.constrained_dynamics import SLIGHT, evaluate_constraints
+from osimlite.mechanics.kernels.constrained_dynamics import INDEPENDENCE, evaluate_constraints
 from osimlite.mechanics.kernels.layout import LINK_WORK, MODEL
 from osimlite.mechanics.kernels.points import link_work
 from osimlite.mechanics.multibody.body_constraints import find_carrier
@@ -67,7 +67,7 @@ class ConstraintForces:
                 rows, missing = (
                     np.asarray(np.linalg.solve(factor, matrix), float) for matrix in (rows, missing)
                 )
-            result = solve_least_norm(rows, missing, SLIGHT * np.sqrt(rows.shape[1]))
+            result = solve_least_norm(rows, missing, INDEPENDENCE * np.sqrt(rows.shape[1]))
             multipliers = np.split(result, np.cumsum([len(block) for block in blocks])[:-1])
             yield cls(state, list(zip(constraints, multipliers, strict=True)))
 

@@ -28,7 +28,7 @@ from osimlite.view.motion import (
     read_activations,
 )
 from osimlite.view.picture import FORCE, INK, SKY, Camera, ForceArrow, Style, draw_scene
-from osimlite.view.scene import STEEPEST, Scene
+from osimlite.view.scene import MIN_FLOOR_COSINE, Scene
 
 Plane = Literal["xy", "yz", "xz"]
 
@@ -44,7 +44,7 @@ product: along -Z, -X (so that Z points to the left) and -Y (so that Z points do
 LONGEST_ARROW = 0.7
 """Length of the arrow of the largest force, as a part of half the picture's height."""
 
-SCENERY = 3.0
+SCENERY_SIZE = 3.0
 """Size of a static object, relative to the moving objects, above which pictures may cut it off."""
 
 Progress = Callable[[int, int], None]
@@ -208,7 +208,7 @@ class Film:
                     static = np.maximum(static, distances)
         return (
             np.maximum(moving_reach, static)
-            if (static <= SCENERY * moving_reach.max()).all()
+            if (static <= SCENERY_SIZE * moving_reach.max()).all()
             else moving_reach
         )
 
@@ -227,7 +227,7 @@ class Film:
                 # The direction into a half space is its X axis.
                 inward = transform[:3, 0]
                 # A steep plane crosses the line below the focus far away.
-                if abs(inward @ self.up) > STEEPEST * np.linalg.norm(inward):
+                if abs(inward @ self.up) > MIN_FLOOR_COSINE * np.linalg.norm(inward):
                     point_below = focus + self.up * ((transform[:3, 3] - focus) @ inward) / (
                         inward @ self.up
                     )

@@ -76,18 +76,18 @@ STICK: Color = (0.149, 0.196, 0.247)
 _TO_Z = make_transform(rotation_about(np.array((1.0, 0.0, 0.0)), -np.pi / 2))
 """Rotation (4, 4) that turns a cylinder along Z into one along Y."""
 
-_ENDLESS = 1.0
+_ENDLESS_LENGTH_M = 1.0
 """Drawn length of a contact cylinder, which is infinitely long, m."""
 
 _MARKER_RADIUS = 0.008
 
-STRESS = 6e5
+SPECIFIC_TENSION_PA = 6e5
 """Specific tension (60 N/cm²) that gives the cross-section of drawn fibers, Pa."""
 
-SLENDER = 0.4
+DRAWN_RADIUS_FRACTION = 0.4
 """Drawn radius relative to that of the cross-section, so that muscles do not hide the bones."""
 
-THICKEST = 0.025
+MAX_RADIUS_M = 0.025
 """Largest radius of drawn fibers, m."""
 
 
@@ -289,7 +289,7 @@ class _SceneCollector:
                     (shape.radius, shape.radius, 2.0 * shape.half_height)
                 )
             case contact_types.ContactCylinder() | wrap_types.WrapCylinder():
-                length = getattr(shape, "length", _ENDLESS)
+                length = getattr(shape, "length", _ENDLESS_LENGTH_M)
                 return unit_shapes.make_cylinder(), _make_stretch(
                     (shape.radius, shape.radius, length)
                 )
@@ -524,8 +524,12 @@ def _measure_fibers(muscle: Muscle) -> tuple[float, float]:
     """Return the drawn radius of the fibers in their middle and the tendon slack length, both in m."""
     force, tendon = abs(float(muscle.max_isometric_force)), abs(float(muscle.tendon_slack_length))
     # The cross-section A = F / stress gives the radius of a circle.
-    radius = SLENDER * math.sqrt(force / (math.pi * STRESS)) if math.isfinite(force) else THICKEST
-    return min(max(radius, 0.0035), THICKEST), tendon if math.isfinite(tendon) else 0.0
+    radius = (
+        DRAWN_RADIUS_FRACTION * math.sqrt(force / (math.pi * SPECIFIC_TENSION_PA))
+        if math.isfinite(force)
+        else MAX_RADIUS_M
+    )
+    return min(max(radius, 0.0035), MAX_RADIUS_M), tendon if math.isfinite(tendon) else 0.0
 
 
 def _make_stretch(size: Any, translation: Any = (0.0, 0.0, 0.0)) -> Array:

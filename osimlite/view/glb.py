@@ -25,7 +25,7 @@ from osimlite.view.motion import DrawableMotion, get_values, interpolate_columns
 from osimlite.view.picture import FORCE
 from osimlite.view.scene import Bodies, Color, Scene
 
-RATE = 60.0
+MAX_FRAME_RATE_HZ = 60.0
 """Largest number of poses per second; players interpolate linearly between them."""
 
 _FLOAT, _UINT32 = 5126, 5125
@@ -48,7 +48,7 @@ def write_glb(scene: Scene, q: Array, motion: DrawableMotion | None, path: str |
     if motion is not None:
         recorded = np.asarray(motion.times, dtype=float)
         # More poses than a player shows would only make the file larger.
-        max_moments = round((recorded[-1] - recorded[0]) * RATE) + 1
+        max_moments = round((recorded[-1] - recorded[0]) * MAX_FRAME_RATE_HZ) + 1
         times = (
             recorded
             if len(recorded) <= max_moments

@@ -21,7 +21,7 @@ from osimlite.schema.specs import get_field_specs
 from osimlite.schema.tree import Tree
 from osimlite.view.scene import Scene
 
-LONGEST = 400
+MAX_PROPERTY_LENGTH = 400
 """Number of characters of a property that are shown; curves have thousands."""
 
 
@@ -55,7 +55,8 @@ def component_tree(model: Model) -> tuple[list[dict[str, Any]], dict[str, list[s
             "kind": class_tag,
             "parent": -1 if parent is None else index_by_id.get(id(parent), -1),
             "values": [
-                text if len(text) <= LONGEST else text[:LONGEST] + " …" for _, text, _ in rows
+                text if len(text) <= MAX_PROPERTY_LENGTH else text[:MAX_PROPERTY_LENGTH] + " …"
+                for _, text, _ in rows
             ],
             "given": [index for index, (_, _, is_explicit) in enumerate(rows) if is_explicit],
         }

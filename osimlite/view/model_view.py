@@ -37,7 +37,7 @@ from osimlite.view.rrd import write_rrd
 from osimlite.view.scene import Color, Scene
 from osimlite.view.server import PageServer
 
-HOME = (1.0, 0.35, 1.3)
+CAMERA_DIRECTION = (1.0, 0.35, 1.3)
 """Direction from the model to the camera of a picture: forward, up, and to the model's right."""
 
 
@@ -197,7 +197,11 @@ class ModelView:
         points = np.concatenate(visible_points or [np.array(scene.compute_box(q))])
         # A horizontal direction: perpendicular to X, or to Y where X is the vertical.
         side = np.cross((1.0, 0.0, 0.0), up) if abs(up[0]) < 0.9 else np.cross((0.0, 1.0, 0.0), up)
-        direction = HOME[0] * np.cross(up, side) + HOME[1] * up + HOME[2] * side
+        direction = (
+            CAMERA_DIRECTION[0] * np.cross(up, side)
+            + CAMERA_DIRECTION[1] * up
+            + CAMERA_DIRECTION[2] * side
+        )
         camera = Camera.from_points(points, up, direction, size[0] / size[1])
         picture = draw_scene(
             scene, q, camera, size, arrows, Style(scene.find_floor_height(q), loaded, colors)

@@ -30,15 +30,15 @@ from osimlite.view.inspect import component_tree, finding_rows, place_pins
 from osimlite.view.kernels import kernels_text, program_data, text_of
 from osimlite.view.motion import DrawableMotion, find_moving_bodies, get_values, read_activations
 from osimlite.view.recording import MeasuredMarkers
-from osimlite.view.scene import LAYERS, STEEPEST, Scene
+from osimlite.view.scene import LAYERS, MIN_FLOOR_COSINE, Scene
 
 SCRIPTS = ("mechanism.js", "tubes.js", "stage.js", "panels.js", "curves.js", "viewer.js")
 """Scripts of the page, in the order in which it runs them."""
 
-TRAVELS = 0.5
+MIN_TRAVEL = 0.5
 """Travel of the model, relative to its size, beyond which the camera follows it at first."""
 
-MOMENTS = 25
+BOX_POSES = 25
 """Number of poses along a motion that determine its bounding box."""
 
 
@@ -295,12 +295,12 @@ def _choose_view(scene: Scene, values: Array) -> dict[str, Any]:
     If the model travels, the box is relative to the moving bodies, because the camera follows them.
     """
     # A few moments suffice to find the extent.
-    rows = values[np.unique(np.linspace(0, len(values) - 1, MOMENTS).astype(int))]
+    rows = values[np.unique(np.linspace(0, len(values) - 1, BOX_POSES).astype(int))]
     poses = [scene.compute_poses(row) for row in rows]
     is_moving = find_moving_bodies(poses)[:-1]
     centers = np.array([pose.origins[:-1][is_moving].mean(axis=0) for pose in poses])
     boxes = np.array([scene.compute_box_of(pose) for pose in poses])
-    is_travelling = np.linalg.norm(centers[-1] - centers[0]) > TRAVELS * np.linalg.norm(
+    is_travelling = np.linalg.norm(centers[-1] - centers[0]) > MIN_TRAVEL * np.linalg.norm(
         boxes[0, 1] - boxes[0, 0]
     )
     # A following camera moves with the bodies, so their travel must not widen the view.
@@ -332,7 +332,7 @@ def _describe_floor(scene: Scene, q: Array) -> dict[str, Any]:
         outward = -bodies.transform_frame(drawn_item.body, drawn_item.matrix)[:3, 0]
         size = float(np.linalg.norm(outward))
         # A steep half space is a wall.
-        if drawn_item.path in scene.half_spaces and outward @ scene.up > STEEPEST * size:
+        if drawn_item.path in scene.half_spaces and outward @ scene.up > MIN_FLOOR_COSINE * size:
             matrix = drawn_item.matrix.copy()
             # The plane's X axis points into the half space; the grid has Y upwards.
             matrix[:3, :3] = np.column_stack((matrix[:3, 1], -matrix[:3, 0], matrix[:3, 2])) / size

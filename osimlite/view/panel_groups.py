@@ -23,7 +23,7 @@ MULTIPLE = "× optimal force"
 """Unit of controls of actuators that are no muscles."""
 FORCE_UNITS = frozenset({"N", "N·m", "W"})
 """Units of sums of large terms. A sum that should be zero has a rounding error instead."""
-NOISE = 1e-9
+ZERO_FRACTION = 1e-9
 """Force, moment or power that counts as zero, relative to the largest one of a table."""
 
 _SIDE_TOKENS = (
@@ -180,7 +180,7 @@ def group_columns(
         base_name, side = sides[column.name]
         values = np.asarray(column.values, dtype=float)
         if column.unit in FORCE_UNITS:
-            values = np.where(np.abs(values) <= NOISE * largest[column.unit], 0.0, values)
+            values = np.where(np.abs(values) <= ZERO_FRACTION * largest[column.unit], 0.0, values)
         if is_constant(values):
             descriptions = constant.setdefault(column.section, [])
             descriptions.append(_describe_constant(column, values))

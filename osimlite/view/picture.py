@@ -33,7 +33,7 @@ EARTH = (0.91, 0.89, 0.85)
 FORCE = (0.835, 0.369, 0.0)
 """Colour of force arrows: vermilion of Okabe and Ito, which colour-blind people distinguish."""
 
-TOUCHING = (0.969, 0.71, 0.22)
+LOADED_CONTACT = (0.969, 0.71, 0.22)
 """Colour of loaded contact surfaces."""
 
 # Axes of both vectors: to the right, up, and towards the viewer.
@@ -51,7 +51,7 @@ _IN_GROUND = np.eye(4)
 _FROM_THE_EDGE = 0.02
 """Sine of the angle between view and plane below which a half space is drawn as a line."""
 
-_FINE = 2
+_SUPERSAMPLING = 2
 """Number of rendered pixels per pixel of the picture, along each axis, for smooth edges."""
 
 
@@ -152,12 +152,12 @@ def draw_scene(
         raise OsimliteError(
             f"a picture is 16 to 8000 pixels wide and high, not {size[0]} × {size[1]}"
         )
-    width, height = _FINE * size[0], _FINE * size[1]
+    width, height = _SUPERSAMPLING * size[0], _SUPERSAMPLING * size[1]
     canvas = Canvas(width, height, np.array(SKY))
     triangles = _TriangleList(camera, width, height)
     _fill_background(triangles, scene, scene.compute_poses(q), arrows, style or Style())
     triangles.draw_on(canvas)
-    return image.fromarray(canvas.to_pixels(_FINE))
+    return image.fromarray(canvas.to_pixels(_SUPERSAMPLING))
 
 
 def _fill_background(
@@ -174,7 +174,7 @@ def _fill_background(
             _cut_half_space(triangles, bodies.transform_frame(drawn_item.body, drawn_item.matrix))
         loaded = drawn_item.path in style.loaded
         color, opacity = (
-            (TOUCHING, max(drawn_item.opacity, 0.75))
+            (LOADED_CONTACT, max(drawn_item.opacity, 0.75))
             if loaded
             else (drawn_item.color, drawn_item.opacity)
         )

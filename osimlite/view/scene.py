@@ -27,13 +27,13 @@ Layer = Literal["geometry", "contact", "wrap", "markers", "paths", "springs", "f
 LAYERS: tuple[Layer, ...] = ("geometry", "contact", "wrap", "markers", "paths", "springs", "frames")
 """Layers that can be shown or hidden."""
 
-SCENERY = 12.0
+SCENERY_SIZE = 12.0
 """Size, relative to the median size of shapes, above which pictures may cut a shape off."""
 
-STEEPEST = 0.5
+MIN_FLOOR_COSINE = 0.5
 """Least cosine between the vertical and the normal of a half space that is a floor, not a wall."""
 
-_FEW = 1500
+_MAX_EXACT_POINTS = 1500
 """Number of points of a surface up to which all are transformed; of others only a box is."""
 
 
@@ -220,7 +220,7 @@ class Scene:
             dtype=bool,
         )
         # The median is the usual size, which a few large shapes do not change.
-        limit = SCENERY * float(np.median(sizes[is_geometry])) if is_geometry.any() else np.inf
+        limit = SCENERY_SIZE * float(np.median(sizes[is_geometry])) if is_geometry.any() else np.inf
         return frozenset(
             k
             for k, drawn_item in enumerate(self.items)
@@ -231,7 +231,7 @@ class Scene:
         """Return points (k, 3) that bound an item in the body's frame: all, or corners of a box."""
         points = self.surfaces[drawn_item.surface].points
         # Eight corners of a box instead of all points: an outline is enough here.
-        if len(points) > _FEW:
+        if len(points) > _MAX_EXACT_POINTS:
             points = _box_corners(points.min(axis=0), points.max(axis=0))
         in_body: Array = points @ drawn_item.matrix[:3, :3].T + drawn_item.matrix[:3, 3]
         return in_body

@@ -20,7 +20,7 @@ _log = logging.getLogger(__name__)
 # Not reachable from other machines: the page shows models that may not be public.
 HOST = "127.0.0.1"
 _LONGEST = 1_000_000
-PATIENCE = 30.0
+IDLE_TIMEOUT_S = 30.0
 """Time without data from the browser after which a connection is closed (s)."""
 
 
@@ -43,7 +43,7 @@ class PageServer:
     def __init__(self, page: str, mechanism: Mechanism, port: int = 0) -> None:
         try:
             self.server = _QuietServer(
-                (HOST, port), _make_handler(page.encode(), mechanism, PATIENCE)
+                (HOST, port), _make_handler(page.encode(), mechanism, IDLE_TIMEOUT_S)
             )
         except (OSError, OverflowError) as error:
             raise OsimliteError(

@@ -42,7 +42,7 @@ FIBER_STEPS = 14
 LONGEST_TENDON = 0.4
 """Largest part of a path that is drawn as tendon at each end, so that fibers are always visible."""
 
-BULGE = 0.7
+BULGE_EXPONENT = 0.7
 """Exponent of the sine that gives the radius of fibers along them; 1 would be a spindle."""
 
 END_RINGS = 3
@@ -98,7 +98,7 @@ def lay_tube(
     """
     if corner_count == 0:
         return 0
-    end = _place_rings(corners, corner_count, thin, thick, tendon, growth, rings)
+    end = _write_rings(corners, corner_count, thin, thick, tendon, growth, rings)
     _direct_rings(rings, end)
     _round_off(rings, END_RINGS, END_RINGS - 1, -1)
     _round_off(rings, end - 1, end, 1)
@@ -106,7 +106,7 @@ def lay_tube(
     return end + END_RINGS
 
 
-def _place_rings(
+def _write_rings(
     corners: Floats,
     corner_count: int,
     thin: float,
@@ -168,7 +168,7 @@ def measure_radius(distance: float, start: float, stop: float, thin: float, thic
         thick: radius of the fibers in their middle, m.
     """
     bulge = max(0.0, sin(pi * (distance - start) / (stop - start))) if stop > start else 1.0
-    return max(thin, thin + (thick - thin) * bulge**BULGE)
+    return max(thin, thin + (thick - thin) * bulge**BULGE_EXPONENT)
 
 
 def _add_ring(rings: Floats, ring: int, center: Vector, radius: float, fibers: float) -> int:
@@ -205,8 +205,8 @@ def _round_off(rings: Floats, edge: int, first: int, sign: int) -> None:
     # Distance outwards and radius, as parts of the radius of the edge.
     for shape in ((0.3, 0.95), (0.7, 0.7), (1.0, 0.0)):
         distance, width = shape
-        moved = add_scaled(center, sign * distance * radius, along)
-        _add_ring(rings, ring, moved, width * radius, rings[offset + RING.FIBERS])
+        ring_center = add_scaled(center, sign * distance * radius, along)
+        _add_ring(rings, ring, ring_center, width * radius, rings[offset + RING.FIBERS])
         store_vector(rings, ring * RING.SIZE + RING.ALONG, along)
         ring += sign
 
@@ -276,9 +276,16 @@ def _list_triangles(ring_count: int) -> Indices:
     """Return the triangles (t, 3) between neighbouring rings."""
     ring, corner = np.divmod(np.arange((ring_count - 1) * ROUND_CORNERS), ROUND_CORNERS)
     here = ring * ROUND_CORNERS + corner
-    beside = ring * ROUND_CORNERS + (corner + 1) % ROUND_CORNERS
+    next_corner = ring * ROUND_CORNERS + (corner + 1) % ROUND_CORNERS
     triangles: Indices = np.stack(
-        (here, beside, here + ROUND_CORNERS, beside, beside + ROUND_CORNERS, here + ROUND_CORNERS),
+        (
+            here,
+            next_corner,
+            here + ROUND_CORNERS,
+            next_corner,
+            next_corner + ROUND_CORNERS,
+            here + ROUND_CORNERS,
+        ),
         axis=1,
     ).reshape(-1, 3)
     return triangles

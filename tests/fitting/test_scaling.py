@@ -16,7 +16,7 @@ from osimlite.fitting.measuring import select_frames
 from osimlite.fitting.scale_tool import compute_scaled_model
 from osimlite.fitting.scaling import get_scale_rules, scale_model
 from osimlite.io.tables.storage import read_sto
-from osimlite.schema.facts import HOLDER, OWN, PATH
+from osimlite.schema.facts import HOLDER, PATH, SELF
 from osimlite.schema.registry import MODULES
 from tests.fitting.support import assert_same
 
@@ -31,7 +31,7 @@ def test_every_rule_is_about_a_property_that_is_there() -> None:
         for property_name, rule in get_scale_rules(cls).items():
             whose = rule.split()[0]
             assert property_name in cls.model_fields, name
-            assert whose in (OWN, HOLDER, PATH) or whose in cls.model_fields, name
+            assert whose in (SELF, HOLDER, PATH) or whose in cls.model_fields, name
             count += 1
     assert count > 50
 

@@ -129,7 +129,7 @@ def test_a_table_is_taken_from_the_cache(fixtures, tmp_path, monkeypatch):
 
 
 def test_a_file_of_many_blocks_is_one_table(tmp_path, monkeypatch):
-    monkeypatch.setattr("osimlite.lint.scan.BLOCK", 60)
+    monkeypatch.setattr("osimlite.lint.scan.BLOCK_BYTES", 60)
     lines = [f"{row / 100:.2f}\t{row}\t-1.5" for row in range(200)]
     lines[150] = lines[150].replace("-1.5", "nan")
     path = tmp_path / "walk.sto"

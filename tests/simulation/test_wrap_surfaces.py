@@ -53,7 +53,7 @@ def bent(law, p, first, second):
     """
     e = np.full(wrapping.WRAP_WORK.END, 7.0)
     e[wrapping.WRAP_WORK.FIRST_END : wrapping.WRAP_WORK.FIRST_TANGENT] = *first, *second
-    item, state = np.zeros(ITEM.OWN, dtype=np.int64), np.zeros(1)
+    item, state = np.zeros(ITEM.DETAILS, dtype=np.int64), np.zeros(1)
     says = law(item, p, e, state, state, 0)
     return (
         says,

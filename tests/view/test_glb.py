@@ -14,7 +14,7 @@ from osimlite.mechanics.multibody import build_mechanism
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.view.collect import build_scene
 from osimlite.view.drawn_forces import DrawnForces
-from osimlite.view.glb import RATE, write_glb
+from osimlite.view.glb import MAX_FRAME_RATE_HZ, write_glb
 from osimlite.view.motion import order_columns
 from tests.view.motions import Recorded, stroll
 
@@ -85,7 +85,7 @@ def test_bodies_and_shapes_move(tmp_path):
     motion.values = motion.values + np.linspace(0.0, 7.0, len(motion.times))[:, None]
     scene, read = written(dynamic_walker(), tmp_path, motion)
     times = read.array(read.parts["animations"][0]["samplers"][0]["input"])[:, 0]
-    assert len(times) == round(0.5 * RATE) + 1
+    assert len(times) == round(0.5 * MAX_FRAME_RATE_HZ) + 1
     assert (times[0], times[-1]) == (0.0, 0.5)
     values = order_columns(motion, scene.mechanism, motion.values)
     for moment in (0, 11, 30):

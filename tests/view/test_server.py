@@ -29,7 +29,7 @@ def running():
     )
     model.constraint_set.objects.append(coupled)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(module, "PATIENCE", 0.2)
+        patch.setattr(module, "IDLE_TIMEOUT_S", 0.2)
         with PageServer("<p>page</p>", build_mechanism(model)) as server:
             yield server
 

@@ -17,7 +17,7 @@ from osimlite.lint.config import Config
 from osimlite.lint.diagnostic import Report
 from osimlite.lint.engine import activate_plugin_classes, make_subject, run_rules
 from osimlite.lint.measures import MEASURES
-from osimlite.lint.project_files import BEGINNING, is_opensim_xml, is_table
+from osimlite.lint.project_files import BEGINNING_BYTES, is_opensim_xml, is_table
 from osimlite.lint.registry import all_rules
 from osimlite.lint.settings import load_settings
 from osimlite.lint.setup import Setup
@@ -73,7 +73,7 @@ class DocumentAnalysis:
         self.file = file
         self.use_cached_measures = use_cached_measures
         self.is_table = is_table(file)
-        beginning = text.content[:BEGINNING].encode("utf-8", "replace")
+        beginning = text.content[:BEGINNING_BYTES].encode("utf-8", "replace")
         self.is_foreign = file.lower().endswith(".xml") and not is_opensim_xml(beginning)
 
     @cached_property

@@ -27,13 +27,13 @@ if TYPE_CHECKING:
 
 ENDING = ".c3d"
 
-SECONDS = 2
+MIN_CPU_SECONDS = 2
 """Processor time for a small file and for loading numpy; large files get more by their size."""
 
 BYTES_PER_SECOND = 2_000_000
 """Smallest accepted rate of reading a file per second; a sound file is read about 50 times faster."""
 
-PATIENCE = 30
+ELAPSED_TIME_FACTOR = 30
 """Factor from the limit of processor time to the limit of elapsed time."""
 
 PROGRAM = "import sys; sys.path[:0] = sys.argv[3:]; from osimlite.io.tables.c3d_process import run_process; run_process()"
@@ -91,7 +91,7 @@ def _run_reader(path: str | Path, content_type: str) -> dict[str, Array]:
             "'osimlite[c3d]'",
             file=str(path),
         )
-    seconds = SECONDS + size // BYTES_PER_SECOND
+    seconds = MIN_CPU_SECONDS + size // BYTES_PER_SECOND
     # Imported here because most commands never read such a file.
     import subprocess
 
@@ -113,7 +113,7 @@ def _run_reader(path: str | Path, content_type: str) -> dict[str, Array]:
             command,
             stdin=subprocess.DEVNULL,
             capture_output=True,
-            timeout=PATIENCE * seconds,
+            timeout=ELAPSED_TIME_FACTOR * seconds,
             check=False,
             cwd=Path(__file__).parent,
             # One thread of OpenBLAS: its threads count as memory in the limit.

@@ -206,10 +206,12 @@ def report_doubtful_value(subject: Subject, report: FindingCollector) -> None:
         huge = [number for number in _to_numbers(value) if HUGE <= abs(number) < math.inf]
         if huge and not _may_be_infinite(item, spec):
             # Tools have limits that no motion reaches.
-            is_overflow = subject.model is not None and max(map(abs, huge)) >= OVERFLOWS
+            is_overflow = subject.model is not None and max(map(abs, huge)) >= OVERFLOW_LIMIT
             _report_size(subject, report, item, spec, huge[0], "large", is_error=is_overflow)
     for item, spec, value in [] if subject.model is None else _find_small_sizes(subject):
-        _report_size(subject, report, item, spec, value, "small", is_error=value <= 1.0 / OVERFLOWS)
+        _report_size(
+            subject, report, item, spec, value, "small", is_error=value <= 1.0 / OVERFLOW_LIMIT
+        )
     _report_short_fibers(subject, report)
 
 
@@ -222,7 +224,7 @@ def _report_short_fibers(subject: Subject, report: FindingCollector) -> None:
     for muscle in subject.find_by_class("Millard2012EquilibriumMuscle"):
         length = muscle.optimal_fiber_length
         if (
-            not 1.0 / OVERFLOWS < length < DOUBTFUL_FIBER
+            not 1.0 / OVERFLOW_LIMIT < length < DOUBTFUL_FIBER
             or muscle.ignore_tendon_compliance
             or not muscle.fiber_damping > 0.0
         ):
@@ -307,7 +309,7 @@ HUGE = 1e20
 """Number that no quantity of a motion reaches, in any unit."""
 
 
-OVERFLOWS = 1e100
+OVERFLOW_LIMIT = 1e100
 """Number above which third and fourth powers in formulas of muscles and contacts overflow."""
 
 SHORTEST_FIBER = 3e-8

@@ -251,7 +251,7 @@ def report_stray_joint_frame(subject: Subject, report: FindingCollector) -> None
             )
 
 
-_LOCKED = 1e-8
+_LOCK_SINE = 1e-8
 """Sine of the angle between an axis and the plane of the others; below it OpenSim 4.6 computes NaN (measured)."""
 
 
@@ -293,7 +293,7 @@ def report_gimbal_lock(subject: Subject, report: FindingCollector) -> None:
                 second_axis[2] * third_axis[0] - second_axis[0] * third_axis[2],
                 second_axis[0] * third_axis[1] - second_axis[1] * third_axis[0],
             )
-            if abs(dot(first_axis, normal)) < _LOCKED:
+            if abs(dot(first_axis, normal)) < _LOCK_SINE:
                 second_coordinate = next(
                     item for item in list_coordinates(joint) if item.name == rotation_axes[1][0]
                 )

@@ -16,8 +16,8 @@ from osimlite.mechanics.kernels.assembly_equations import (
     ASSEMBLY,
     ASSEMBLY_ARRAY,
     ASSEMBLY_NUMBERS,
-    EASE,
     HOLD,
+    UNCOUNTED_MOBILITY,
     Assembly,
     count_equations,
     equation_factor,
@@ -51,9 +51,9 @@ MAX_STEPS = 100
 """Largest number of steps of a search."""
 LONGEST_STEP = 0.5
 """Largest change of a coordinate in one step towards the constraints (m or rad)."""
-OUTSIDE = 1e-12
+RANGE_TOLERANCE = 1e-12
 """Largest distance of a coordinate outside of its range (m or rad)."""
-EXACT = 1e-15
+ROUNDING_ERROR = 1e-15
 """Errors of equations below this are rounding errors (m or rad)."""
 SHORTEST_STEP = 1e-13
 """A step shorter than this part of the largest coordinate, or of 1, ends the search."""
@@ -62,14 +62,14 @@ TINY_STEP = 1e-6
 
 Such a step is taken as long as steps shrink.
 """
-FAST = 0.1
+FAST_CONVERGENCE = 0.1
 """Steps that shrink by less than this factor need the curvature of the constraints."""
-DIFFERENCE = 1e-6
+DIFFERENCE_STEP = 1e-6
 """Length of the finite differences of the equations (m or rad)."""
-FLAT = 1e-7
+MIN_CURVATURE = 1e-7
 """Curvature of the cost below which a direction counts as undetermined."""
-SAFE = 1e-6
-"""Least pivot of Cholesky's method above which no curvature is below `FLAT`."""
+SAFE_PIVOT = 1e-6
+"""Least pivot of Cholesky's method above which no curvature is below `MIN_CURVATURE`."""
 
 
 def assembly_work_size(count: int, size: int) -> int:
@@ -150,7 +150,7 @@ def assemble_pose(a: Assembly, target: Floats, q: Floats) -> bool:
     while True:
         if not find_nearest(a, target, q):
             return False
-        worst, largest_violation = -1, OUTSIDE
+        worst, largest_violation = -1, RANGE_TOLERANCE
         for k in range(size):
             if clamped[k] > 0 and status[k] == HOLD.FREED:
                 violation = max(ranges[2 * k] - q[k], q[k] - ranges[2 * k + 1])
@@ -203,7 +203,7 @@ def find_nearest(a: Assembly, target: Floats, q: Floats) -> bool:
         length = find_step(a, target, q, has_curvature)
         # Curvature costs 2 evaluations per free direction, so it is used only where convergence is
         # slow.
-        if not has_curvature and length > FAST * previous_length:
+        if not has_curvature and length > FAST_CONVERGENCE * previous_length:
             has_curvature = True
             length = find_step(a, target, q, has_curvature)
         furthest = 1.0
@@ -305,7 +305,7 @@ def restore_pose(a: Assembly, q: Floats, is_assembled: bool) -> bool:
     largest = evaluate_equations(a, q)
     for _ in range(MAX_STEPS):
         # The first condition is false for infinite and undefined errors.
-        if not largest < inf or largest <= EXACT:
+        if not largest < inf or largest <= ROUNDING_ERROR:
             break
         rank = factorise_rows(a, free, not is_assembled)
         for i in range(count):
@@ -315,7 +315,7 @@ def restore_pose(a: Assembly, q: Floats, is_assembled: bool) -> bool:
         for k in range(free):
             # The unknown of an eased coordinate is its change over EASE.
             if not is_assembled and counted[free_list[k]] == 0:
-                step[k] *= EASE
+                step[k] *= UNCOUNTED_MOBILITY
             furthest = max(furthest, abs(step[k]))
         # Far from a solution the linearization is poor: take short steps, even where errors grow.
         copy_numbers(size, q, trial)
@@ -383,7 +383,7 @@ def find_step(a: Assembly, target: Floats, q: Floats, has_curvature: bool) -> fl
     is_convex = factorise_cholesky(dimension, spare, 0.0)
     # A pivot that is too small hides a direction without curvature, which `step_downhill` handles.
     for k in range(dimension):
-        is_convex = is_convex and spare[dimension * k + k] * spare[dimension * k + k] > SAFE
+        is_convex = is_convex and spare[dimension * k + k] * spare[dimension * k + k] > SAFE_PIVOT
     if is_convex:
         solve_cholesky(dimension, spare, lengths)
     else:
@@ -450,7 +450,7 @@ def add_curvature(
         for j in range(free):
             row_change[j] = 0.0
         for side in range(2):
-            change = DIFFERENCE if side == 0 else -DIFFERENCE
+            change = DIFFERENCE_STEP if side == 0 else -DIFFERENCE_STEP
             copy_numbers(size, q, trial)
             for j in range(free):
                 trial[free_list[j]] += change * null_space[free * k + j]
@@ -484,7 +484,7 @@ def step_downhill(count: int, curvature: Floats, vectors: Floats, work: Floats, 
         for j in range(count):
             total += vectors[count * k + j] * x[j]
         # The absolute value turns a direction of negative curvature downhill.
-        work[k] = 0.0 if value < FLAT else total / value
+        work[k] = 0.0 if value < MIN_CURVATURE else total / value
     for j in range(count):
         x[j] = 0.0
         for k in range(count):

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from osimlite.mechanics.kernels.constrained_dynamics import evaluate_constraints
 from osimlite.mechanics.kernels.layout import CONSTRAINED, MODEL, STAGE, Record
 from osimlite.mechanics.kernels.linear_algebra import (
-    REDUNDANT,
+    REDUNDANCY_TOLERANCE,
     ROUNDING,
     factorise_equations,
 )
@@ -68,7 +68,7 @@ class ASSEMBLY_NUMBERS(metaclass=Record):
     """Ranges (n, 2) in m or rad."""
 
 
-EASE = 100.0
+UNCOUNTED_MOBILITY = 100.0
 """Factor by which coordinates that do not count move more easily."""
 
 
@@ -164,7 +164,7 @@ def factorise_rows(a: Assembly, free: int, is_eased: bool) -> int:
     Args:
         a: the assembly, whose rows are known.
         free: number of free degrees of freedom.
-        is_eased: whether coordinates that do not count move more easily, by EASE.
+        is_eased: whether coordinates that do not count move more easily, by UNCOUNTED_MOBILITY.
 
     Returns:
         Rank of the equations.
@@ -183,7 +183,7 @@ def factorise_rows(a: Assembly, free: int, is_eased: bool) -> int:
         for k in range(free):
             entry = rows[size * i + free_list[k]]
             if is_eased and counted[free_list[k]] == 0:
-                entry *= EASE
+                entry *= UNCOUNTED_MOBILITY
             factor[free * i + k] = entry
             total += entry * entry
         lengths[i] = sqrt(total)
@@ -195,4 +195,4 @@ def factorise_rows(a: Assembly, free: int, is_eased: bool) -> int:
             lengths[i] = longest
         for k in range(free):
             factor[free * i + k] /= lengths[i]
-    return factorise_equations(count, free, factor, REDUNDANT)
+    return factorise_equations(count, free, factor, REDUNDANCY_TOLERANCE)

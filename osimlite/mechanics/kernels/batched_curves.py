@@ -13,7 +13,7 @@ from osimlite.mechanics.kernels.pointers import Floats, at
 from osimlite.mechanics.laws.bezier import (
     FIRST,
     LAST,
-    ROUNDS,
+    MAX_HALLEY_STEPS,
     STARTS,
     X,
     Y,
@@ -174,7 +174,7 @@ def compute_requests(lanes: Any, request_count: int, rounds: int) -> None:
                 lanes[LANES * CURVE_ROW.REMAINDER + lane],
             )
             u, _, _, _ = search_section(
-                lanes, LANES * CURVE_ROW.OF_X + lane, LANES, u, remainder, ROUNDS - rounds
+                lanes, LANES * CURVE_ROW.OF_X + lane, LANES, u, remainder, MAX_HALLEY_STEPS - rounds
             )
             lanes[LANES * CURVE_ROW.U + lane] = u
             store_result(lanes, lane)

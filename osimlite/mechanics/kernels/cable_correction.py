@@ -44,9 +44,9 @@ UNKNOWNS = 4
 """Number of unknowns of an obstacle: the natural variations of its geodesic."""
 EQUATIONS = 5
 """Number of equations of an obstacle: two per end, and one for the length."""
-LARGEST = radians(10.0)
+MAX_ROTATION_RAD = radians(10.0)
 """Largest rotation of an end in one correction (rad)."""
-SIGNIFICANT = 2.0**-45.5
+INDEPENDENCE = 2.0**-45.5
 """Threshold of independence per equation, Simbody's significant part of a double."""
 
 # Start of the workspace: that of an integration; then lines, kinks, corrections and the equations.
@@ -134,19 +134,19 @@ def correct_geodesics(
             number += 1
             previous_obstacle = k
     # The threshold of independence is Simbody's.
-    rank = factorise_equations(equations, size, a, SIGNIFICANT * equations)
+    rank = factorise_equations(equations, size, a, INDEPENDENCE * equations)
     solve_minimum_norm(equations, size, a, rank, values, at(values, equations), corrections)
     for k in range(size):
         corrections[k] = -corrections[k]
-    # Turn no end by more than LARGEST, for which the linearization holds; all geodesics take the
+    # Turn no end by more than MAX_ROTATION_RAD, for which the linearization holds; all geodesics take the
     # same part.
     step, number = 1.0, 0
     for k in range(first + 1, last):
         obstacle_record = at(record, elements[ELEMENT.SIZE * k + ELEMENT.RECORD])
         if obstacle_record[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
             largest_rotation = largest_turn(obstacle_record, at(corrections, 4 * number))
-            if largest_rotation > LARGEST:
-                step = min(step, LARGEST / largest_rotation)
+            if largest_rotation > MAX_ROTATION_RAD:
+                step = min(step, MAX_ROTATION_RAD / largest_rotation)
             number += 1
     number = 0
     for k in range(first + 1, last):
@@ -154,7 +154,7 @@ def correct_geodesics(
         obstacle_record = at(record, element[ELEMENT.RECORD])
         if obstacle_record[OBSTACLE_WORK.STATE] == OBSTACLE_STATE.TOUCHES:
             surface = at(p, element[ELEMENT.AT] + OBSTACLE.SURFACE)
-            if not shoot_again(
+            if not reshoot_geodesics(
                 surface,
                 at(obstacle_record, OBSTACLE_WORK.CURVE),
                 at(corrections, 4 * number),
@@ -310,7 +310,7 @@ def largest_component(a: Vector) -> float:
     return max(abs(x), abs(y), abs(z))
 
 
-def shoot_again(
+def reshoot_geodesics(
     surface: Floats, geodesic: Floats, corrections: Floats, step: float, work: Floats
 ) -> bool:
     """Apply a fraction of the corrections to a geodesic.

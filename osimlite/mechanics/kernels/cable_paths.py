@@ -53,9 +53,9 @@ from osimlite.mechanics.laws.vectors import (
     vector,
 )
 
-SMOOTH = 1e-5
+MAX_KINK_RAD = 1e-5
 """Largest kink (rad) at which the search ends."""
-ROUNDS = 50
+MAX_CORRECTIONS = 50
 """Largest number of corrections."""
 
 
@@ -148,7 +148,7 @@ def find_cable(
     """
     lines = at(work, GEODESIC_WORK_SIZE)
     count = 0
-    for round_number in range(ROUNDS + 1):
+    for round_number in range(MAX_CORRECTIONS + 1):
         # Contacts change while the search runs, as in Simbody, because lines move with the
         # geodesics.
         for k in range(first + 1, last_element):
@@ -160,7 +160,7 @@ def find_cable(
         # NaN arises where two points coincide or a geodesic degenerates.
         if isnan(rough):
             return nan
-        if rough <= SMOOTH or round_number == ROUNDS:
+        if rough <= MAX_KINK_RAD or round_number == MAX_CORRECTIONS:
             break
         if not correct_geodesics(elements, p, record, first, last_element, count, rough, work):
             return nan

@@ -15,11 +15,11 @@ from osimlite.mechanics.kernels.layout import ITEM, Record
 class CABLE(metaclass=Record):
     """Integers of a cable."""
 
-    COUNT = ITEM.OWN + 1
+    COUNT = ITEM.DETAILS + 1
     """Number of its elements."""
-    SOLVER = ITEM.OWN + 2
+    SOLVER = ITEM.DETAILS + 2
     """Offset in the record of the workspace of the search."""
-    ELEMENTS = ITEM.OWN + 3
+    ELEMENTS = ITEM.DETAILS + 3
     """Elements."""
 
 

@@ -117,27 +117,27 @@ ACCURACY = 1e-10
 """Accuracy of a step of Merson's method."""
 CONSTRAINT = 1e-9
 """Largest value of the function of the surface after a step."""
-SMALLEST = 2.0**-45.5
+MIN_STEP_M = 2.0**-45.5
 """Smallest step (m)."""
-EXACT = 1e-12
+EXTRAPOLATION_TOLERANCE_M = 1e-12
 """Change of the end by the last column of an extrapolation (m); the error is far smaller."""
-ROUNDED = 1e-15
+EXTRAPOLATION_RESIDUAL = 1e-15
 """Largest value of the function of the surface after an extrapolation, which moment arms need."""
 MOST_STEPS = 10_000
 """Largest number of steps along a geodesic."""
 MOST_CORRECTIONS = 10
 """Largest number of Newton steps back to the surface."""
-LEAST = 0.1
+MIN_STEP_FACTOR = 0.1
 """Smallest factor of a change of the step, as in Simbody's GeodesicIntegrator; so are the next five."""
-MOST = 5.0
+MAX_STEP_FACTOR = 5.0
 """Largest factor of a change of the step."""
 SAFETY = 0.9
 """Ratio of the chosen step to the one that would just meet the accuracy."""
-STRETCH = 0.1
+LAST_STEP_STRETCH = 0.1
 """Part of a step by which the last step may be stretched."""
-LESS = 0.9
+MAX_FACTOR_AFTER_REJECTION = 0.9
 """Largest factor of a step after a rejection."""
-MORE = 1.2
+MIN_GROWTH = 1.2
 """Smallest factor with which a step is made longer."""
 
 
@@ -371,21 +371,24 @@ def integrate_by_merson(
     while t != length:
         next_t = t + step
         # Stretch the last step rather than add a tiny one.
-        if next_t + STRETCH * step > length:
+        if next_t + LAST_STEP_STRETCH * step > length:
             next_t = length
         while True:
             h = next_t - t
             error = merson_step(p, h, work)
             if error <= ACCURACY and project_to_surface(p, trial, 0.1 * CONSTRAINT):
                 break
-            if not h > SMALLEST:
+            if not h > MIN_STEP_M:
                 return False
             # A rejected step is shortened by the error, or by a tenth where it left the surface too
             # far.
             if error > ACCURACY:
-                h = min(max(SAFETY * h * sqrt(sqrt(ACCURACY / error)), LEAST * h), LESS * h)
+                h = min(
+                    max(SAFETY * h * sqrt(sqrt(ACCURACY / error)), MIN_STEP_FACTOR * h),
+                    MAX_FACTOR_AFTER_REJECTION * h,
+                )
             else:
-                h *= LEAST
+                h *= MIN_STEP_FACTOR
             next_t = t + h
         step_count += 1
         if step_count == 1:
@@ -399,8 +402,10 @@ def integrate_by_merson(
         geodesic_derivative(p, y, rates)
         if next_t < length:
             # The method is of fourth order, hence the fourth root of the error.
-            longer = MOST * h if error == 0.0 else SAFETY * h * sqrt(sqrt(ACCURACY / error))
-            step = min(longer if longer >= MORE * h else h, MOST * h)
+            longer = (
+                MAX_STEP_FACTOR * h if error == 0.0 else SAFETY * h * sqrt(sqrt(ACCURACY / error))
+            )
+            step = min(longer if longer >= MIN_GROWTH * h else h, MAX_STEP_FACTOR * h)
         t = next_t
     store_end(p, vector(y, 0), vector(y, 5), at(geodesic, GEODESIC.END))
     (
@@ -437,7 +442,7 @@ def integrate_by_extrapolation(
     store_vector(y, 0, point)
     store_vector(y, 5, unit(direction))
     y[3], y[4], y[8], y[9] = 0.0, 1.0, 1.0, 0.0
-    if not project_to_surface(p, y, ROUNDED):
+    if not project_to_surface(p, y, EXTRAPOLATION_RESIDUAL):
         return False
     store_end(p, vector(y, 0), vector(y, 5), at(geodesic, GEODESIC.START))
     remaining_length = step = length
@@ -446,10 +451,10 @@ def integrate_by_extrapolation(
         while not extrapolate_step(p, step, work):
             # Most geodesics succeed in one step over their complete length.
             step *= 0.5
-            if not step > SMALLEST:
+            if not step > MIN_STEP_M:
                 return False
         remaining_length -= step
-        if not project_to_surface(p, y, ROUNDED):
+        if not project_to_surface(p, y, EXTRAPOLATION_RESIDUAL):
             return False
     store_end(p, vector(y, 0), vector(y, 5), at(geodesic, GEODESIC.END))
     (
@@ -501,7 +506,7 @@ def extrapolate_step(p: Floats, step: float, work: Floats) -> bool:
                 if k < 3:
                     error = max(error, abs(row[k] - finer_row[k]))
         # Three columns are the least from which the error can be judged.
-        if column > 1 and error <= EXACT:
+        if column > 1 and error <= EXTRAPOLATION_TOLERANCE_M:
             for k in range(SIZE):
                 y[k] = columns[k]
             return True

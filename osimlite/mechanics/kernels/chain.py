@@ -3,7 +3,7 @@
 The joints of the other program (Bullet) follow the coordinates: their rates are J u, and their
 accelerations J udot + b. The equations of motion of the coordinates are those of the joints,
 projected: the mass matrix is Jᵀ M J, and the bias is Jᵀ times the joint forces at the
-accelerations b. A share is an entry of J that may differ from zero.
+accelerations b. The derivatives are the entries of J that may differ from zero.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from osimlite.mechanics.kernels.layout import (
     DOF,
     EXCESS,
     JOINT,
-    JOINT_KIND,
+    JOINT_DERIVATIVE,
+    JOINT_SOURCE,
     LINK_WORK,
     MODEL,
     OPERATION,
     OPERATION_WORK,
     OUTCOME,
     PRODUCT,
-    SHARE,
 )
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
 from osimlite.mechanics.kernels.points import link_work, operation_ints, operation_work
@@ -65,20 +65,23 @@ def chain_dynamics(
     # Joint forces follow the values, rates and accelerations of the joints, and the matrix follows
     # them.
     forces = at(data, h[CHAIN.WORK_JOINTS] + 3 * h[CHAIN.JOINTS])
-    shares = at(data, h[CHAIN.WORK_SHARES])
+    derivatives = at(data, h[CHAIN.WORK_DERIVATIVES])
     matrix = at(forces, h[CHAIN.JOINTS])
-    for k in range(h[CHAIN.SHARES]):
-        share = at(model, h[CHAIN.SHARE_AT] + SHARE.SIZE * k)
-        joint, freedom = share[SHARE.JOINT], share[SHARE.DOF]
+    for k in range(h[CHAIN.DERIVATIVES]):
+        derivative_record = at(model, h[CHAIN.DERIVATIVE_AT] + JOINT_DERIVATIVE.SIZE * k)
+        joint, freedom = (
+            derivative_record[JOINT_DERIVATIVE.JOINT],
+            derivative_record[JOINT_DERIVATIVE.DOF],
+        )
         if freedom >= 0:
-            right[freedom] -= shares[k] * forces[joint]
+            right[freedom] -= derivatives[k] * forces[joint]
     for k in range(h[CHAIN.ENTRY_AT], h[CHAIN.END_ENTRY]):
         data[k] = 0.0
     for k in range(h[CHAIN.PRODUCTS]):
         product = at(model, h[CHAIN.PRODUCT_AT] + PRODUCT.SIZE * k)
         data[product[PRODUCT.TARGET]] += (
-            shares[product[PRODUCT.ONE]]
-            * shares[product[PRODUCT.TWO]]
+            derivatives[product[PRODUCT.ONE]]
+            * derivatives[product[PRODUCT.TWO]]
             * matrix[product[PRODUCT.ENTRY]]
         )
     # Links without mass have a small inertia in the other program, which requires one; it is
@@ -132,12 +135,12 @@ def subtract_inertia(
 
 
 def move_joints(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -> None:
-    """Compute values, rates and accelerations while udot = 0 of all joints, and the shares.
+    """Compute values, rates and accelerations while udot = 0 of all joints, and the derivatives.
 
     Args:
         model: integers of the model.
         reals: numbers of the model.
-        data: filled at `CHAIN.WORK_JOINTS` and `CHAIN.WORK_SHARES`.
+        data: filled at `CHAIN.WORK_JOINTS` and `CHAIN.WORK_DERIVATIVES`.
         y: state.
         f: rates of the coordinates.
     """
@@ -149,11 +152,11 @@ def move_joints(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) 
         joint_kind = joint[JOINT.KIND]
         source = joint[JOINT.SOURCE]
         component_index = joint[JOINT.PART]
-        shares = at(data, h[CHAIN.WORK_SHARES] + joint[JOINT.FIRST_SHARE])
+        derivatives = at(data, h[CHAIN.WORK_DERIVATIVES] + joint[JOINT.FIRST_DERIVATIVE])
         # A joint that is a coordinate, or a multiple of one, is the usual case.
-        if joint_kind == JOINT_KIND.LINE:
+        if joint_kind == JOINT_SOURCE.LINE:
             factor = reals[component_index]
-            shares[0] = factor
+            derivatives[0] = factor
             joint_motion[0], joint_motion[count], joint_motion[2 * count] = (
                 factor * y[source],
                 factor * f[source],
@@ -162,29 +165,29 @@ def move_joints(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) 
             continue
         j = operation_ints(model, source)
         a = operation_work(model, data, source)
-        if joint_kind == JOINT_KIND.AMOUNT_OF:
+        if joint_kind == JOINT_SOURCE.AMOUNT_OF:
             for k in range(j[OPERATION.ARGUMENT_COUNT]):
-                shares[k] = data[j[OPERATION.GRADIENT] + k]
+                derivatives[k] = data[j[OPERATION.GRADIENT] + k]
             joint_motion[0], joint_motion[count], joint_motion[2 * count] = (
                 a[OPERATION_WORK.AMOUNT],
                 a[OPERATION_WORK.RATE],
                 a[OPERATION_WORK.CURVATURE],
             )
-        elif joint_kind == JOINT_KIND.ANGLE:
+        elif joint_kind == JOINT_SOURCE.ANGLE:
             angles = at(model, j[OPERATION.ARGUMENTS])
             joint_motion[0], joint_motion[count] = (
                 y[angles[component_index]],
                 f[angles[component_index]],
             )
-            joint_motion[2 * count] = move_angle(angles, y, f, component_index, shares)
-        elif joint_kind == JOINT_KIND.ELLIPSOID:
+            joint_motion[2 * count] = move_angle(angles, y, f, component_index, derivatives)
+        elif joint_kind == JOINT_SOURCE.ELLIPSOID:
             joint_motion[0], joint_motion[count], joint_motion[2 * count] = move_end(
                 at(model, j[OPERATION.ARGUMENTS]),
                 y,
                 at(y, model[MODEL.DOFS]),
                 component_index,
                 reals[j[OPERATION.EXTRA] + component_index],
-                shares,
+                derivatives,
             )
         else:
             # The joint of a drift has no motion, but an acceleration.

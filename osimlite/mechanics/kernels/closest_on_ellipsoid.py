@@ -14,11 +14,11 @@ from osimlite.mechanics.kernels.pointers import Floats
 from osimlite.mechanics.laws.dual_numbers import differentiate_root
 from osimlite.mechanics.laws.vectors import Vector, add_scaled, component, minus, norm, plus, unit
 
-FLAT = 2e-13
+PLANE_TOLERANCE_M = 2e-13
 """Distance from a plane of symmetry (m) up to which OpenSim counts a point as in the plane."""
-SMALL = 1e-9
+RESIDUAL_TOLERANCE = 1e-9
 """Absolute value of the polynomial at which Newton's method ends."""
-STEPS = 64
+MAX_NEWTON_STEPS = 64
 """Largest number of Newton steps."""
 SAMPLES = 300
 """Number of intervals of the chord; the fan has a blade at each inner point but the last."""
@@ -54,7 +54,7 @@ def closest_point(radii: Vector, point: Vector) -> Vector:
     # Find the longest axis along which the point has no component.
     axis = -1
     for k in range(3):
-        if abs(component(point, k)) <= FLAT and (
+        if abs(component(point, k)) <= PLANE_TOLERANCE_M and (
             axis < 0 or component(radii, k) > component(radii, axis)
         ):
             axis = k
@@ -68,9 +68,9 @@ def closest_point(radii: Vector, point: Vector) -> Vector:
     # Outside, this start is beyond the largest root, from which Newton's method converges
     # monotonically.
     t = 0.0 if is_inside else max(a, b, c) * norm(point)
-    for _ in range(STEPS):
+    for _ in range(MAX_NEWTON_STEPS):
         value, slope = evaluate_polynomial(t + aa, t + bb, t + cc, aauu, bbvv, ccww)
-        if abs(value) < SMALL:
+        if abs(value) < RESIDUAL_TOLERANCE:
             # The root carries derivatives by the implicit function theorem, although OpenSim's
             # steps end early.
             t = differentiate_root(t, value, slope)
@@ -136,27 +136,27 @@ def closest_on_ellipse(a: float, b: float, u: float, v: float) -> tuple[float, f
     aa, bb = a * a, b * b
     # At the centre the nearest points are the ends of the shorter axis; the sign decides between
     # them.
-    if abs(u) <= FLAT and abs(v) <= FLAT:
+    if abs(u) <= PLANE_TOLERANCE_M and abs(v) <= PLANE_TOLERANCE_M:
         return (-a if u < 0.0 else a, v) if a < b else (u, -b if v < 0.0 else b)
-    if abs(u) <= FLAT:
+    if abs(u) <= PLANE_TOLERANCE_M:
         # On an axis: within the evolute two points are nearest, and OpenSim takes that with a
         # positive coordinate.
         if a >= b or abs(v) >= b - aa / b:
             return u, b if v >= 0.0 else -b
         y = bb * v / (bb - aa)
         return a * sqrt(abs(1.0 - (y / b) * (y / b))), y
-    if abs(v) <= FLAT:
+    if abs(v) <= PLANE_TOLERANCE_M:
         if b >= a or abs(u) >= a - bb / a:
             return a if u >= 0.0 else -a, v
         x = aa * u / (aa - bb)
         return x, b * sqrt(abs(1.0 - (x / a) * (x / a)))
     aauu, bbvv = aa * (u * u), bb * (v * v)
     t = 0.0 if (u / a) * (u / a) + (v / b) * (v / b) < 1.0 else max(a, b) * sqrt(u * u + v * v)
-    for _ in range(STEPS):
+    for _ in range(MAX_NEWTON_STEPS):
         P, Q = t + aa, t + bb
         value = P * P * (Q * Q) - aauu * (Q * Q) - bbvv * (P * P)
         slope = 2.0 * (P * Q * (P + Q) - aauu * Q - bbvv * P)
-        if abs(value) < SMALL:
+        if abs(value) < RESIDUAL_TOLERANCE:
             t = differentiate_root(t, value, slope)
             break
         t -= value / slope
@@ -187,10 +187,10 @@ def mean_outward_direction(radii: Vector, start: Vector, chord: Vector, work: Fl
             value, slope = evaluate_polynomial(aa, bb, cc, aauu, bbvv, ccww)
             work[BLADES.PART + k], work[BLADES.MULTIPLIER + k] = (
                 fraction,
-                -value / slope if abs(value) >= SMALL else 0.0,
+                -value / slope if abs(value) >= RESIDUAL_TOLERANCE else 0.0,
             )
             work[BLADES.X + k], work[BLADES.Y + k], work[BLADES.Z + k] = aauu, bbvv, ccww
-        for _ in range(STEPS):
+        for _ in range(MAX_NEWTON_STEPS):
             active_lanes = 0
             for k in range(LANES):
                 t = work[BLADES.MULTIPLIER + k]
@@ -202,7 +202,7 @@ def mean_outward_direction(radii: Vector, start: Vector, chord: Vector, work: Fl
                     work[BLADES.Y + k],
                     work[BLADES.Z + k],
                 )
-                if abs(value) >= SMALL:
+                if abs(value) >= RESIDUAL_TOLERANCE:
                     t -= value / slope
                     active_lanes += 1
                 work[BLADES.MULTIPLIER + k] = t
@@ -227,7 +227,7 @@ def mean_outward_direction(radii: Vector, start: Vector, chord: Vector, work: Fl
             blade = work[BLADES.X + k], work[BLADES.Y + k], work[BLADES.Z + k]
             u, v, w = point
             # In a plane of symmetry the formula degenerates.
-            if min(abs(u), abs(v), abs(w)) <= FLAT:
+            if min(abs(u), abs(v), abs(w)) <= PLANE_TOLERANCE_M:
                 blade = unit(minus(closest_point(radii, point), point))
             total = plus(total, blade)
     return unit(total)

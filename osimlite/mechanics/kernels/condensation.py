@@ -127,11 +127,11 @@ class CONTACT_NUMBERS(metaclass=Record):
     """Radius of surface 2."""
 
 
-SLIGHT = 1e-12
+FORCE_ROUNDING = 1e-12
 """Entries of a generalized force per newton below this are rounding errors."""
 
 
-HEAVY = 1e6
+CONSTRAINT_MASS = 1e6
 """Mass that represents a constraint equation, relative to the largest diagonal entry of M."""
 
 
@@ -216,7 +216,7 @@ def linearise_state(
             add_generalized_forces(model, data, right)
         for k in range(size):
             record[k] = right[k]
-            if abs(right[k]) > SLIGHT:
+            if abs(right[k]) > FORCE_ROUNDING:
                 first = min(first, k)
                 end = k + 1
         record[size + RESPONSE_WORK.FIRST], record[size + RESPONSE_WORK.END] = first, end
@@ -253,7 +253,7 @@ def response_record(model: Ints, work: Floats, number: int) -> Floats:
 def fill_mass_matrix(model: Ints, data: Floats, mass: Floats) -> None:
     """Fill the mass matrix, with heavy masses along the constraint equations.
 
-    The equation G du = 0 is replaced by a mass HEAVY times the largest entry of M along each row of
+    The equation G du = 0 is replaced by a mass CONSTRAINT_MASS times the largest entry of M along each row of
     G. Multipliers would need a larger, indefinite system. The small motion that remains
     across the constraints is removed by the projection of the step.
 
@@ -285,7 +285,9 @@ def fill_mass_matrix(model: Ints, data: Floats, mass: Floats) -> None:
             for k in range(size):
                 square += row[k] * row[k]
             if square > 0.0:
-                add_outer_product(size, HEAVY * largest / square, row, 0, size, row, 0, size, mass)
+                add_outer_product(
+                    size, CONSTRAINT_MASS * largest / square, row, 0, size, row, 0, size, mass
+                )
 
 
 def add_geometric_stiffness(model: Ints, reals: Floats, data: Floats, levers: Floats) -> None:
@@ -317,8 +319,8 @@ def add_geometric_stiffness(model: Ints, reals: Floats, data: Floats, levers: Fl
         contact = at(data, model[MODEL.WORK_CONTACT] + CONTACT_WORK.SIZE * pair)
         force = vector(contact, CONTACT_WORK.FORCE)
         point = vector(contact, CONTACT_WORK.FORCE + 3)
-        first_link = i[ITEM.OWN]
-        second_link = i[ITEM.OWN + 1]
+        first_link = i[ITEM.DETAILS]
+        second_link = i[ITEM.DETAILS + 1]
         # Contacts with ground only move one link; pairs of surfaces on ground have no degrees of
         # freedom.
         if contact[CONTACT_WORK.DEPTH] > 0.0 and max(first_link, second_link) >= 0:

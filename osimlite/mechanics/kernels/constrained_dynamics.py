@@ -13,7 +13,7 @@ from math import sqrt
 from osimlite.mechanics.kernels.dynamics import SMALLEST_PIVOT, solve_accelerations
 from osimlite.mechanics.kernels.layout import CONSTRAINED, DOF, ITEM, MODEL, OUTCOME
 from osimlite.mechanics.kernels.linear_algebra import (
-    REDUNDANT,
+    REDUNDANCY_TOLERANCE,
     ROUNDING,
     apply_q,
     factorise_by_law,
@@ -26,7 +26,7 @@ from osimlite.mechanics.laws.dual_numbers import is_exact_zero
 
 SAFE_MASS = 1e-10
 """Smallest pivot of M relative to its diagonal with which M is inverted."""
-SLIGHT = 2.0**-19.5
+INDEPENDENCE = 2.0**-19.5
 """Threshold of independence per square root of the number of equations.
 
 Equations with a smaller response than this part of the largest one are dropped, as in Simbody,
@@ -136,7 +136,7 @@ def solve_by_multipliers(model: Ints, data: Floats, right: Floats, work: Floats)
         solve_transposed_factor(model, data, weighted_row)
         for k in range(size):
             weighted_row[k] *= scales[k]
-    factorise_by_law(model, data, count, weighted, SLIGHT * sqrt(count))
+    factorise_by_law(model, data, count, weighted, INDEPENDENCE * sqrt(count))
     # The second pass removes rounding errors of the first.
     for _ in range(2):
         for i in range(count):
@@ -234,7 +234,7 @@ def solve_in_null_space(
         values[i] = scale * drifts[i]
         for k in range(size):
             equations[size * i + k] = scale * rows[size * i + k]
-    rank = factorise_by_law(model, data, count, equations, REDUNDANT)
+    rank = factorise_by_law(model, data, count, equations, REDUNDANCY_TOLERANCE)
     # The complement of the rank is the number of remaining degrees of freedom.
     free = size - rank
     # A particular solution of the equations; the free motion is added to it.

@@ -103,7 +103,7 @@ def prescribe(
     i = at(model, constraint)
     h = at(model, model[MODEL.CONSTRAINED])
     row = i[CONSTRAINT.FIRST_EQUATION]
-    coordinate_ints = at(i, CONSTRAINT.OWN)
+    coordinate_ints = at(i, CONSTRAINT.DETAILS)
     value, slope, curvature = evaluate_function(at(reals, i[CONSTRAINT.NUMBERS]), data[WORK.TIME])
     data[h[CONSTRAINED.WORK_ERRORS] + row] = y[coordinate_ints[0]] - value
     data[h[CONSTRAINED.WORK_RATES] + row] = slope
@@ -143,7 +143,7 @@ def couple(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, const
     h = at(model, model[MODEL.CONSTRAINED])
     p = at(reals, model[constraint + CONSTRAINT.NUMBERS])
     row = i[CONSTRAINT.FIRST_EQUATION]
-    coupler_ints = at(i, CONSTRAINT.OWN)
+    coupler_ints = at(i, CONSTRAINT.DETAILS)
     size = coupler_ints[COORDINATE.SIZE + 1]
     freedoms = at(coupler_ints, COORDINATE.SIZE + 2)
     coordinate_records = at(freedoms, size)
@@ -227,7 +227,7 @@ def bind_bodies(
     h = at(model, model[MODEL.CONSTRAINED])
     first, size = i[CONSTRAINT.FIRST_EQUATION], model[MODEL.DOFS]
     for row in range(first, i[CONSTRAINT.END_EQUATION]):
-        equation_ints = at(i, CONSTRAINT.OWN + EQUATION_INTS * (row - first))
+        equation_ints = at(i, CONSTRAINT.DETAILS + EQUATION_INTS * (row - first))
         p = at(reals, i[CONSTRAINT.NUMBERS] + EQUATION_NUMBERS * (row - first))
         first_vector = at(equation_ints, 1)
         second_vector = at(equation_ints, 1 + VECTOR_INTS)

@@ -55,7 +55,7 @@ from osimlite.mechanics.laws.vectors import (
     vector,
 )
 
-SMOOTH = 9
+SMOOTH_PARAMETERS = 9
 """Number of parameters of the law of smooth contact."""
 
 
@@ -116,8 +116,8 @@ def measure_half_space(
         Depth (m), effective radius (m), normal, and point of application (m).
     """
     i = at(model, item)
-    first_link = i[ITEM.OWN]
-    second_link = i[ITEM.OWN + 1]
+    first_link = i[ITEM.DETAILS]
+    second_link = i[ITEM.DETAILS + 1]
     p = at(reals, i[ITEM.NUMBERS])
     o = station(model, data, first_link, vector(p, 0))
     n = direction(model, data, first_link, vector(p, 3))
@@ -143,8 +143,8 @@ def measure_spheres(
     """
     i = at(model, item)
     p = at(reals, i[ITEM.NUMBERS])
-    first_center = station(model, data, i[ITEM.OWN], vector(p, 0))
-    second_center = station(model, data, i[ITEM.OWN + 1], vector(p, 7))
+    first_center = station(model, data, i[ITEM.DETAILS], vector(p, 0))
+    second_center = station(model, data, i[ITEM.DETAILS + 1], vector(p, 7))
     return sphere_sphere(first_center, p[6], second_center, p[10], p[12])
 
 
@@ -169,18 +169,18 @@ def contact_response(
         `OUTCOME.OK`.
     """
     i, change = at(model, item), at(data, WORK.SCRATCH)
-    pair = item - i[ITEM.OWN]
-    axis = i[ITEM.OWN + 1]
+    pair = item - i[ITEM.DETAILS]
+    axis = i[ITEM.DETAILS + 1]
     for k in range(RESPONSE_WORK.INVERSE):
         change[k] = 0.0
     d, radius, n, point = (
         measure_half_space(model, reals, data, pair)
-        if i[ITEM.OWN + 2] > 0
+        if i[ITEM.DETAILS + 2] > 0
         else measure_spheres(model, reals, data, pair)
     )
     if d > 0.0:
-        first_link = model[pair + ITEM.OWN]
-        second_link = model[pair + ITEM.OWN + 1]
+        first_link = model[pair + ITEM.DETAILS]
+        second_link = model[pair + ITEM.DETAILS + 1]
         p = at(reals, model[pair + ITEM.NUMBERS])
         v = minus(
             velocity(model, data, first_link, point), velocity(model, data, second_link, point)
@@ -217,10 +217,10 @@ def smooth_contact_response(
     i, change = at(model, item), at(data, WORK.SCRATCH)
     for k in range(RESPONSE_WORK.INVERSE):
         change[k] = 0.0
-    contact = item + i[ITEM.OWN]
+    contact = item + i[ITEM.DETAILS]
     p = at(reals, model[contact + ITEM.NUMBERS])
-    g = at(model, contact + ITEM.OWN)
-    geometry = at(p, SMOOTH)
+    g = at(model, contact + ITEM.DETAILS)
+    geometry = at(p, SMOOTH_PARAMETERS)
     n = direction(model, data, g[0], vector(geometry, 3))
     center = station(model, data, g[1], vector(geometry, 6))
     d = geometry[9] - dot(minus(center, station(model, data, g[0], vector(geometry, 0))), n)
@@ -232,7 +232,7 @@ def smooth_contact_response(
     if growth != 0.0:
         touching = ContactState(g[0], g[1], point, center, n, v, 0.5)
         changes = pressed, damped, dragged
-        write_response(model, data, y, f, touching, i[ITEM.OWN + 1], changes, growth)
+        write_response(model, data, y, f, touching, i[ITEM.DETAILS + 1], changes, growth)
     return OUTCOME.OK
 
 
@@ -390,8 +390,8 @@ def apply_contact_force(
         point: point of application (m).
     """
     i = at(model, item)
-    first_link = i[ITEM.OWN]
-    second_link = i[ITEM.OWN + 1]
+    first_link = i[ITEM.DETAILS]
+    second_link = i[ITEM.DETAILS + 1]
     p = at(reals, i[ITEM.NUMBERS])
     result = at(data, i[ITEM.RECORD])
     # Relative velocity at the point of application, of surface 1 relative to surface 2.
@@ -440,8 +440,8 @@ def contact_places(
             i = at(model, model[model[MODEL.CONTACT_AT] + pair])
             result_row = at(positions, 9 * (pairs * k + pair))
             a = at(x, i[ITEM.NUMBERS])
-            first_link = i[ITEM.OWN]
-            second_link = i[ITEM.OWN + 1]
+            first_link = i[ITEM.DETAILS]
+            second_link = i[ITEM.DETAILS + 1]
             store_vector(result_row, 0, station(model, data, first_link, vector(a, 0)))
             store_vector(result_row, 3, direction(model, data, first_link, vector(a, 3)))
             store_vector(result_row, 6, station(model, data, second_link, vector(a, 7)))

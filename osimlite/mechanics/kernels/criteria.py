@@ -36,7 +36,7 @@ class CRITERION_TYPE(metaclass=Record):
     """Metabolic power of Wang et al. (W)."""
 
 
-QUARTER = 0.5 * pi
+RIGHT_ANGLE = 0.5 * pi
 """A right angle (rad)."""
 
 
@@ -418,8 +418,8 @@ def metabolic_power(
     optimal = at(sensor_numbers, SENSOR_NUMBERS.HEAD)
     strengths = at(sensor_numbers, SENSOR_NUMBERS.HEAD + count)
     for k in range(count):
-        u = QUARTER * excitations[k]
-        a = QUARTER * row[sensor_plan[SENSOR_PLAN.ACTIVATIONS] + k]
+        u = RIGHT_ANGLE * excitations[k]
+        a = RIGHT_ANGLE * row[sensor_plan[SENSOR_PLAN.ACTIVATIONS] + k]
         n = row[sensor_plan[SENSOR_PLAN.LENGTHS] + k]
         of_activation = 40.0 * slow * sin(u) + 133.0 * (1.0 - slow) * (1.0 - cos(u))
         of_maintenance = 74.0 * slow * sin(a) + 111.0 * (1.0 - slow) * (1.0 - cos(a))

@@ -10,7 +10,7 @@ bound, so that the active set changes as a whole (L. Qi, J. Sun, A nonsmooth ver
 method, Math. Programming 58, 1993). Each frame starts from the multipliers of the previous one.
 Other exponents p are reached by Newton steps, each of which is a weighted problem with p = 2.
 
-A proximal term SLIGHT |λ - λ'|² makes the dual function strictly concave, where λ' is the previous
+A proximal term PROXIMAL_WEIGHT |λ - λ'|² makes the dual function strictly concave, where λ' is the previous
 solution (R. T. Rockafellar, Augmented Lagrangians and applications of the proximal point
 algorithm, Math. Oper. Research 1, 1976). Redundant equations are therefore harmless, and if the
 problem is infeasible, the residual b - A x converges to the shortest possible one.
@@ -47,33 +47,33 @@ class EFFORT_NUMBERS(metaclass=Record):
     """Bounds (2, n): all lower ones, then all upper ones."""
 
 
-TIGHTEST = 1e-15
+MIN_RESIDUAL = 1e-15
 """Relative residual of the regularized equations below which an iteration cannot improve it."""
-CLOSEST = 1e-13
+TARGET_RESIDUAL = 1e-13
 """Relative residual of the equations at which the search ends."""
-CLOSE = 1e-10
+MAX_RESIDUAL = 1e-10
 """Largest relative residual of the equations with which a frame counts as solved."""
 ROUNDING = 1e-12
 """Entries below this part of the largest of their column are rounding errors and count as zero."""
-LEAST = 1e-14
+MIN_ENTRY = 1e-14
 """Entries below this part of the largest of A count as zero: internal forces move no pelvis."""
-SLIGHT = 1e-9
+PROXIMAL_WEIGHT = 1e-9
 """Weight of the proximal term |λ - λ'|², relative to the mean second derivative of the dual."""
-SLOWEST = 0.9
+MAX_RESIDUAL_RATIO = 0.9
 """A further proximal step must reduce the residual to this part of the previous one, or less."""
-CENTRES = 30
+MAX_PROXIMAL_STEPS = 30
 """Largest number of proximal steps, each of which starts from a new λ'."""
-ROUNDS = 100
+MAX_NEWTON_STEPS = 100
 """Largest number of Newton steps per proximal step."""
-HALVINGS = 60
+MAX_LINE_SEARCH_TRIALS = 60
 """Largest number of trial lengths in a line search."""
 NEWTON_STEPS = 200
 """Largest number of Newton steps towards the minimizer for an exponent other than 2."""
-PATIENCE = 20
+MAX_STALLED_STEPS = 20
 """Number of Newton steps without progress after which a proximal step ends."""
-SMALLEST = 1e-6
+MIN_RELATIVE_X = 1e-6
 """For p < 2: relative |x| below which the curvature of |x|^p is taken at this value, as it diverges."""
-SOFTEST = 1e-8
+MIN_RELATIVE_CURVATURE = 1e-8
 """For p > 2: smallest curvature relative to the largest one, as it vanishes at x = 0."""
 LEAST_GAIN = 1e-15
 """Relative decrease of the sum below which the Newton steps for p other than 2 end."""
@@ -128,7 +128,7 @@ def least_effort(
             solve_weighted_least_squares(
                 sizes, numbers, columns, x, at(x, n), multipliers, inner_work
             )
-            <= CLOSE
+            <= MAX_RESIDUAL
         )
         # A start from a distant frame may stall; try again from zero.
         if not is_solved:
@@ -138,7 +138,7 @@ def least_effort(
                 solve_weighted_least_squares(
                     sizes, numbers, columns, x, at(x, n), multipliers, inner_work
                 )
-                <= CLOSE
+                <= MAX_RESIDUAL
             )
         # After a frame that has no solution, start from zero.
         for k in range(m):
@@ -172,7 +172,7 @@ def scale_equations(sizes: Ints, columns: Floats, scales: Floats) -> None:
         for k in range(m):
             largest = max(largest, abs(column[k]))
         for k in range(m):
-            if abs(column[k]) <= max(ROUNDING * largest, LEAST * largest_entry):
+            if abs(column[k]) <= max(ROUNDING * largest, MIN_ENTRY * largest_entry):
                 column[k] = 0.0
     for k in range(m):
         square = 0.0
@@ -222,12 +222,12 @@ def minimize_powers(
             return
         for j in range(n):
             size = abs(x[j]) / unit
-            size = max(size, SMALLEST) if power < 2.0 else size
+            size = max(size, MIN_RELATIVE_X) if power < 2.0 else size
             # For p < 2 Newton steps overshoot: use the steeper quadratic majorizer of |x|^p.
             compliances[j] = max(power - 1.0, 1.0) * size ** (power - 2.0)
             stiffest = max(stiffest, compliances[j])
         for j in range(n):
-            stiffness = max(compliances[j], SOFTEST * stiffest)
+            stiffness = max(compliances[j], MIN_RELATIVE_CURVATURE * stiffest)
             slope = unit * (abs(x[j]) / unit) ** (power - 1.0)
             # Newton's step to the minimum of the quadratic model of |x|^p becomes the target.
             targets[j] = x[j] - (slope if x[j] > 0.0 else -slope) / stiffness
@@ -238,7 +238,7 @@ def minimize_powers(
             sizes, numbers, columns, tried, at(x, n), multipliers, work
         )
         # Stop where rounding makes the equations worse.
-        if error > CLOSEST and not restore_equations(
+        if error > TARGET_RESIDUAL and not restore_equations(
             sizes, numbers, columns, tried, at(x, n), multipliers, work
         ):
             break
@@ -246,7 +246,7 @@ def minimize_powers(
         previous_cost = sum_powers(n, power, unit, x, tried, 0.0)
         step_length = 1.0
         trial_cost = sum_powers(n, power, unit, x, tried, step_length)
-        for _ in range(HALVINGS):
+        for _ in range(MAX_LINE_SEARCH_TRIALS):
             if trial_cost < previous_cost:
                 break
             step_length *= 0.5
@@ -310,7 +310,7 @@ def solve_weighted_least_squares(
     terms, slight, matrix = at(centre, 3 * m), at(centre, 4 * m), at(centre, 5 * m)
     error_before = error = 0.0
     # Each proximal step moves the centre λ' to the last multipliers.
-    for number in range(CENTRES):
+    for number in range(MAX_PROXIMAL_STEPS):
         for k in range(m):
             centre[k] = multipliers[k]
         transpose_times(sizes, columns, multipliers, y)
@@ -321,22 +321,22 @@ def solve_weighted_least_squares(
             trace += matrix[m * k + k]
         # The regularization is relative to the mean curvature, so that it scales with the problem.
         for k in range(m):
-            slight[k] = SLIGHT * (trace / m if trace > 0.0 else 1.0)
+            slight[k] = PROXIMAL_WEIGHT * (trace / m if trace > 0.0 else 1.0)
         # Newton's method on the dual function with the present proximal term.
         best, since = error, 0
-        for _ in range(ROUNDS):
+        for _ in range(MAX_NEWTON_STEPS):
             since += 1
             if error < best:
                 # A residual that has not improved for some steps is as small as rounding allows.
                 best, since = error, 0
-            if error <= CLOSEST or since > PATIENCE:
+            if error <= TARGET_RESIDUAL or since > MAX_STALLED_STEPS:
                 break
             largest = 0.0
             for k in range(m):
                 slope[k] = residual[k] - slight[k] * (multipliers[k] - centre[k])
                 step[k] = slope[k]
                 largest = max(largest, abs(slope[k]) / terms[k])
-            if largest <= TIGHTEST:
+            if largest <= MIN_RESIDUAL:
                 break
             fill_dual_hessian(sizes, numbers, columns, work, matrix)
             for k in range(m):
@@ -351,7 +351,9 @@ def solve_weighted_least_squares(
             transpose_times(sizes, columns, multipliers, y)
             error = update_primal(sizes, numbers, columns, work, x, residual, terms)
         # From the third proximal step on, continue only while the residual decreases clearly.
-        if error <= CLOSEST or (number > 1 and not error < SLOWEST * error_before):
+        if error <= TARGET_RESIDUAL or (
+            number > 1 and not error < MAX_RESIDUAL_RATIO * error_before
+        ):
             break
         error_before = error
     return error
@@ -388,7 +390,7 @@ def restore_equations(
         multipliers[k] = 0.0
     return (
         solve_weighted_least_squares(sizes, numbers, columns, x, residual, multipliers, work)
-        <= CLOSE
+        <= MAX_RESIDUAL
     )
 
 
@@ -550,7 +552,7 @@ def line_search(
     change = at(work, 3 * n)
     centre = at(work, 4 * n)
     slight = at(work, 4 * n + 4 * m)
-    for _ in range(HALVINGS):
+    for _ in range(MAX_LINE_SEARCH_TRIALS):
         # Slope of the dual function along the step, including the proximal term.
         rise = 0.0
         for k in range(m):

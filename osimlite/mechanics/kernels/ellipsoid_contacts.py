@@ -32,8 +32,8 @@ def touch_ellipsoid(
         `OUTCOME.OK`.
     """
     i = at(model, item)
-    first_link = i[ITEM.OWN]
-    second_link = i[ITEM.OWN + 1]
+    first_link = i[ITEM.DETAILS]
+    second_link = i[ITEM.DETAILS + 1]
     p = at(reals, i[ITEM.NUMBERS])
     o = station(model, data, first_link, vector(p, 0))
     n = direction(model, data, first_link, vector(p, 3))
@@ -65,8 +65,8 @@ def touch_ellipsoids(
         `OUTCOME.OK`.
     """
     i = at(model, item)
-    first_link = i[ITEM.OWN]
-    second_link = i[ITEM.OWN + 1]
+    first_link = i[ITEM.DETAILS]
+    second_link = i[ITEM.DETAILS + 1]
     p = at(reals, i[ITEM.NUMBERS])
     a = station(model, data, first_link, vector(p, 0))
     b = station(model, data, second_link, vector(p, 7))
@@ -121,9 +121,9 @@ def early_return(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
         `OUTCOME.OK`.
     """
     i = at(model, item)
-    count = i[ITEM.OWN]
-    pairs = i[ITEM.OWN + 1]
-    links = at(i, ITEM.OWN + 2)
+    count = i[ITEM.DETAILS]
+    pairs = i[ITEM.DETAILS + 1]
+    links = at(i, ITEM.DETAILS + 2)
     p = at(reals, i[ITEM.NUMBERS])
     work = at(data, i[ITEM.RECORD])
     centers = work

@@ -47,7 +47,7 @@ ERRORS = 4
 """Offset of the errors of a step after WORK_STATE, in states."""
 
 
-PATIENCE = 10_000
+MAX_STALLED_STEPS = 10_000
 """Number of tried steps after which a motion that makes no progress is abandoned."""
 
 
@@ -55,13 +55,17 @@ def shortest_step(t: float, tried: float) -> float:
     """Return the shortest step at a time t (s) after `tried` tried steps.
 
     As in Simbody, the first steps from t = 0 may have any length. OpenSim continues with such steps
-    forever; here they end after PATIENCE steps.
+    forever; here they end after MAX_STALLED_STEPS steps.
 
     Args:
         t: time (s).
         tried: number of tried steps of the run.
     """
-    return max(2.0**-52 * abs(t), 1e-300) if tried < PATIENCE else 4.0 * 2.0**-52 * max(1.0, abs(t))
+    return (
+        max(2.0**-52 * abs(t), 1e-300)
+        if tried < MAX_STALLED_STEPS
+        else 4.0 * 2.0**-52 * max(1.0, abs(t))
+    )
 
 
 def error_weight(value: float) -> float:

@@ -16,13 +16,13 @@ from osimlite.mechanics.kernels.programs import run_program
 class FUNCTION_PATH(metaclass=Record):
     """Integers of a path whose length is a function of coordinates."""
 
-    COUNT = ITEM.OWN + 1
+    COUNT = ITEM.DETAILS + 1
     """Number of its coordinates."""
-    LENGTH_BACK = ITEM.OWN + 2
+    LENGTH_BACK = ITEM.DETAILS + 2
     """Distance back to the item of the length function."""
-    SPEED_BACK = ITEM.OWN + 3
+    SPEED_BACK = ITEM.DETAILS + 3
     """Distance back to the item of the speed function, 0 if moment arms give the speed."""
-    COORDINATES = ITEM.OWN + 4
+    COORDINATES = ITEM.DETAILS + 4
     """Degrees of freedom of the coordinates, -1 for a locked one.
 
     They are followed by the distances back to the items of the moment arms, 0 for a moment arm that is
@@ -40,11 +40,11 @@ class FUNCTION_PATH_WORK(metaclass=Record):
 class FUNCTION(metaclass=Record):
     """Integers of a function."""
 
-    COUNT = ITEM.OWN
+    COUNT = ITEM.DETAILS
     """Number of its arguments."""
-    ORDER = ITEM.OWN + 1
+    ORDER = ITEM.DETAILS + 1
     """Order of a polynomial, or number of programs of a formula."""
-    ARGUMENTS = ITEM.OWN + 2
+    ARGUMENTS = ITEM.DETAILS + 2
     """Indices of the arguments in a state, -1 for a constant one.
 
     The numbers of a function begin with the values of constant arguments.

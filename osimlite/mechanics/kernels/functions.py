@@ -275,7 +275,7 @@ def multiply_powers(
 def set_controls(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
     """Compute each control as the sum of some functions of time.
 
-    The integers of the record from OWN on are the number of controls, per control the cumulative number
+    The integers of the record from DETAILS on are the number of controls, per control the cumulative number
     of its functions, and the offsets of the functions' tables among the numbers.
 
     Args:
@@ -290,11 +290,11 @@ def set_controls(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
         `OUTCOME.OK`.
     """
     i = at(model, item)
-    count = i[ITEM.OWN]
+    count = i[ITEM.DETAILS]
     numbers = at(reals, i[ITEM.NUMBERS])
     values = at(data, i[ITEM.RECORD])
-    ends = at(i, ITEM.OWN + 1)
-    tables = at(i, ITEM.OWN + 1 + count)
+    ends = at(i, ITEM.DETAILS + 1)
+    tables = at(i, ITEM.DETAILS + 1 + count)
     function_number = 0
     for control in range(count):
         total = 0.0

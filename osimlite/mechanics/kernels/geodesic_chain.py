@@ -42,7 +42,7 @@ class SURFACE_POSE(metaclass=Record):
     """Length of a pose: rotation by rows, position in ground, `HOW` and `ABOUT`."""
 
 
-TOUCH = 1e-10
+MIN_TURN_RAD = 1e-10
 """Smallest angle by which a segment turns around a surface that is inserted (rad)."""
 
 
@@ -151,7 +151,7 @@ def lay_chain(
         work,
     )
     if not (
-        turn > TOUCH
+        turn > MIN_TURN_RAD
         and shoot_geodesic(
             at(slot, OBSTACLE_WORK.SIZE),
             point,

@@ -25,9 +25,9 @@ from osimlite.mechanics.kernels.cable_surfaces import (
     surface_value,
 )
 from osimlite.mechanics.kernels.geodesic_chain import (
+    MIN_TURN_RAD,
     SEARCH_STAGE,
     SURFACE_POSE,
-    TOUCH,
     chain_length,
     find_slot,
     insert_slot,
@@ -102,7 +102,7 @@ INSIDE = 1e-14
 """Value of a surface's function above which a point counts as inside, relative to `SURFACE.SQUARE`."""
 MAX_COMBINATIONS = 16
 """Largest number of combinations of directions past open surfaces."""
-NEARLY = 0.97
+MAX_LENGTH_RATIO = 0.97
 """A path is dropped if this part of its length exceeds that of the shortest one."""
 
 
@@ -369,7 +369,7 @@ def fill_slots(
         elif count == 0:
             break
         # A chain that is clearly longer than the best one need not be smoothed.
-        if NEARLY * chain_length(chain, count) > least or not smooth_chain(
+        if MAX_LENGTH_RATIO * chain_length(chain, count) > least or not smooth_chain(
             chain, count, search_work
         ):
             break
@@ -503,13 +503,13 @@ def find_largest_turn(
                     )
                     # The shorter way decides which line meets the surface, even if there is no
                     # other way.
-                    if turn > TOUCH and norm(about) > 0.0:
+                    if turn > MIN_TURN_RAD and norm(about) > 0.0:
                         turn_about, point_about, direction_about, _ = start_on_surface(
                             numbers, a, b, pose[SURFACE_POSE.HOW], about, work
                         )
-                        if turn_about > TOUCH:
+                        if turn_about > MIN_TURN_RAD:
                             turn, point, start_direction = turn_about, point_about, direction_about
-                    if turn > TOUCH and turn + priority > largest_turn_angle:
+                    if turn > MIN_TURN_RAD and turn + priority > largest_turn_angle:
                         result = number
                         slot_index = k + 1
                         largest_turn_angle = turn + priority

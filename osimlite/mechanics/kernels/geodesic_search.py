@@ -17,7 +17,11 @@ from __future__ import annotations
 
 from math import inf
 
-from osimlite.mechanics.kernels.cable_correction import UNKNOWNS, differentiate_end, shoot_again
+from osimlite.mechanics.kernels.cable_correction import (
+    UNKNOWNS,
+    differentiate_end,
+    reshoot_geodesics,
+)
 from osimlite.mechanics.kernels.cable_paths import end_to_ground
 from osimlite.mechanics.kernels.cable_records import OBSTACLE_WORK
 from osimlite.mechanics.kernels.cable_surfaces import (
@@ -48,23 +52,23 @@ class SLOT(metaclass=Record):
 """
 
 
-SMOOTH = 1e-12
+MAX_KINK_RAD = 1e-12
 """Largest kink (rad) at which a search ends."""
-STALLED = 1e-8
+MAX_STALLED_KINK_RAD = 1e-8
 """Kink (rad) below which a search ends if it does not decrease."""
-NEAR = 1e-3
+MIN_LINE_LENGTH_M = 1e-3
 """Smallest length (m) of a line by which its component across is divided."""
-STIFF = 1.0
+MIN_STIFFNESS = 1.0
 """Smallest stiffness of the springs (N/m) for a tension of 1 N."""
-STIFFER = 3.0
+STIFFNESS_RATIO = 3.0
 """Ratio of successive stiffnesses."""
-ROUNDS = 60
+MAX_ROUNDS = 60
 """Largest number of rounds of a search."""
 MOST_TURN = 0.2
 """Largest rotation of an end of a geodesic in a round (rad)."""
 LEAST_PART = 0.1
 """Smallest part of a geodesic that must remain after a round."""
-SHORT = 1e-6
+SHORT_GEODESIC_RAD = 1e-6
 """Angle (rad) of a geodesic below which it may vanish in a round."""
 
 
@@ -132,20 +136,20 @@ def smooth_chain(chain: Floats, count: int, work: Floats) -> bool:
     corrections = at(values, 2 * size)
     a = at(corrections, size)
     previous_kink, stiff = inf, 0.0
-    for _ in range(ROUNDS):
+    for _ in range(MAX_ROUNDS):
         rough = fill_equations(chain, count, values, a, stiff)
-        if rough <= SMOOTH or previous_kink <= rough < STALLED:
+        if rough <= MAX_KINK_RAD or previous_kink <= rough < MAX_STALLED_KINK_RAD:
             return True
         previous_kink = rough
         rank = factorise_equations(size, size, a, 0.0)
         # A negative determinant marks a saddle of the length: stiffen the springs and try again
         # from here.
         if determinant_sign(size, a) < 0.0:
-            stiff = max(STIFFER * stiff, STIFF)
+            stiff = max(STIFFNESS_RATIO * stiff, MIN_STIFFNESS)
             continue
         solve_minimum_norm(size, size, a, rank, values, at(values, size), corrections)
         # Near a minimum the springs only slow down convergence; release them step by step.
-        stiff = stiff / STIFFER if stiff > STIFF else 0.0
+        stiff = stiff / STIFFNESS_RATIO if stiff > MIN_STIFFNESS else 0.0
         step = 1.0
         for k in range(count):
             step = min(
@@ -159,7 +163,7 @@ def smooth_chain(chain: Floats, count: int, work: Floats) -> bool:
             return step == 0.0
         for k in range(count):
             slot = at(chain, SLOT.SIZE * (k + 1))
-            if not shoot_again(
+            if not reshoot_geodesics(
                 at(slot, OBSTACLE_WORK.SIZE),
                 at(slot, OBSTACLE_WORK.CURVE),
                 at(corrections, UNKNOWNS * k),
@@ -191,7 +195,10 @@ def compute_accepted_part(slot: Floats, corrections: Floats) -> float:
     fraction = MOST_TURN / turn if turn > MOST_TURN else 1.0
     # Keep a part of the length, unless the geodesic is so short already that it may vanish.
     if not arc + fraction * corrections[3] > LEAST_PART * arc:
-        if arc + corrections[3] <= 0.0 and arc * abs(start[END_NUMBERS.ALONG_BENDS]) < SHORT:
+        if (
+            arc + corrections[3] <= 0.0
+            and arc * abs(start[END_NUMBERS.ALONG_BENDS]) < SHORT_GEODESIC_RAD
+        ):
             slot[OBSTACLE_WORK.CURVE + GEODESIC.ARC] = fraction = 0.0
         else:
             corrections[3] = (LEAST_PART - 1.0) * arc
@@ -251,7 +258,7 @@ def fill_equations(chain: Floats, count: int, values: Floats, a: Floats, stiff: 
                 else minus(line_end(chain, k, count), end_point)
             )
             # A kink is the component across over the length; very short lines are not divided by.
-            distance = max(norm(line), NEAR)
+            distance = max(norm(line), MIN_LINE_LENGTH_M)
             for across in range(2):
                 axis = vector(
                     slot, end + (END_NUMBERS.ACROSS if across == 1 else END_NUMBERS.NORMAL)

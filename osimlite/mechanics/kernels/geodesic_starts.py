@@ -25,7 +25,11 @@ from math import atan2, cos, inf, pi, sin, sqrt
 from osimlite.mechanics.kernels.cable_surfaces import SURFACE, SURFACE_TYPE, surface_value
 from osimlite.mechanics.kernels.layout import Record
 from osimlite.mechanics.kernels.pointers import Floats, at
-from osimlite.mechanics.kernels.segment_depths import LEAST, nearest_to_ring, outward_direction
+from osimlite.mechanics.kernels.segment_depths import (
+    MIN_DENOMINATOR,
+    nearest_to_ring,
+    outward_direction,
+)
 from osimlite.mechanics.kernels.wrap_cylinder import closest_to_axis
 from osimlite.mechanics.kernels.wrapping import WRAPPING, decide_wrapping, is_on_side
 from osimlite.mechanics.laws.vectors import (
@@ -80,13 +84,13 @@ class BENDING(metaclass=Record):
     """An ellipsoid bends a segment where a tightened string comes to lie."""
 
 
-ASIDE = 0.5
+MIN_AXIS_COSINE = 0.5
 """Cosine with the least deep direction below which the given axis determines the direction."""
-BENT = 0.7
+STRING_COSINE = 0.7
 """Cosine between both ends of a path below which a string is tightened over an ellipsoid."""
-BEADS = 16
+STRING_SEGMENTS = 16
 """Number of segments of the string."""
-PULLS = 8
+STRING_SWEEPS = 8
 """Number of sweeps at each resolution of the string."""
 
 
@@ -175,7 +179,7 @@ def start_on_cylinder(
         if (
             sweep <= pi
             if is_open
-            else turns_left(
+            else is_left_turn(
                 first_angle, first_tangent_angle, second_angle, second_tangent_angle, sweep
             )
         )
@@ -194,7 +198,7 @@ def start_on_cylinder(
     nx = c * ux - s * uy
     ny = c * uy + s * ux
     # On the unrolled cylinder the path is a straight line of constant slope.
-    slope = (qz - pz) / max(line1 + radius * max(turn, 0.0) + line2, LEAST)
+    slope = (qz - pz) / max(line1 + radius * max(turn, 0.0) + line2, MIN_DENOMINATOR)
     z = pz + slope * line1
     # OpenSim ignores a path that meets and leaves beyond the ends of the cylinder.
     if abs(z) > half_length and abs(qz - slope * line2) > half_length:
@@ -207,7 +211,7 @@ def start_on_cylinder(
     )
 
 
-def turns_left(
+def is_left_turn(
     first_angle: float,
     first_tangent_angle: float,
     second_angle: float,
@@ -272,7 +276,11 @@ def start_on_ellipsoid(
     scaled_second = multiply_elementwise(scale, second)
     scaled_chord = minus(scaled_second, scaled_first)
     fraction = min(
-        max(-dot(scaled_first, scaled_chord) / max(dot(scaled_chord, scaled_chord), LEAST), 0.0),
+        max(
+            -dot(scaled_first, scaled_chord)
+            / max(dot(scaled_chord, scaled_chord), MIN_DENOMINATOR),
+            0.0,
+        ),
         1.0,
     )
     middle = add_scaled(scaled_first, fraction, scaled_chord)
@@ -282,7 +290,10 @@ def start_on_ellipsoid(
     outwards = middle
     # On a sphere the nearest point of the line points out of it; on an ellipsoid the least deep
     # direction must be searched.
-    if p[SURFACE.KIND] == SURFACE_TYPE.ELLIPSOID or norm(cross(middle, scaled_chord)) < LEAST:
+    if (
+        p[SURFACE.KIND] == SURFACE_TYPE.ELLIPSOID
+        or norm(cross(middle, scaled_chord)) < MIN_DENOMINATOR
+    ):
         # Of two opposite directions both start at the narrow side.
         outwards = outward_direction(
             radii,
@@ -301,7 +312,7 @@ def start_on_ellipsoid(
         outwards_about = cross(multiply_elementwise(radii, scaled_chord), about)
         if (
             p[SURFACE.KIND] == SURFACE_TYPE.SPHERE
-            and dot(unit(outwards_about), unit(outwards)) < ASIDE
+            and dot(unit(outwards_about), unit(outwards)) < MIN_AXIS_COSINE
         ):
             outwards = outwards_about
     if side != 0.0 and not is_on_side(outwards, axis, side):
@@ -314,7 +325,7 @@ def start_on_ellipsoid(
     )
     turn, _, sets_out, _ = result
     # A section that turns far, or that starts on the wrong side, is a poor start.
-    is_bent = dot(unit(sets_out), unit(vector(work, 0))) < BENT and (
+    is_bent = dot(unit(sets_out), unit(vector(work, 0))) < STRING_COSINE and (
         side == 0.0 or dot(outwards, middle) > 0.0
     )
     if p[SURFACE.KIND] == SURFACE_TYPE.ELLIPSOID and (is_bent or bending == BENDING.PULLED):
@@ -349,8 +360,8 @@ def start_on_section(
     store_vector(work, 0, multiply_elementwise(radii, cross(normal, a2)))
     length = 0.0
     # Length by the midpoint rule over the angles of the beads.
-    for k in range(1, BEADS):
-        angle = turn * (k - 0.5) / (BEADS - 1)
+    for k in range(1, STRING_SEGMENTS):
+        angle = turn * (k - 0.5) / (STRING_SEGMENTS - 1)
         c, s = cos(angle), sin(angle)
         length += norm(multiply_elementwise(radii, add_scaled(times(c, across), -s, a1)))
         store_vector(
@@ -362,7 +373,7 @@ def start_on_section(
         turn,
         multiply_elementwise(radii, add_scaled(centre, 1.0, a1)),
         multiply_elementwise(radii, across),
-        turn / (BEADS - 1) * length,
+        turn / (STRING_SEGMENTS - 1) * length,
     )
 
 
@@ -381,14 +392,14 @@ def start_on_string(p: Floats, turn: float, first: Vector, second: Vector, work:
         work: beads of the section; the ends are filled, and the beads moved.
     """
     store_vector(work, 0, first)
-    store_vector(work, 3 * BEADS, second)
+    store_vector(work, 3 * STRING_SEGMENTS, second)
     # Start with four segments, so that the string moves far in few sweeps.
-    stride = BEADS // 4
-    first_bead, last_bead = BEADS, 0
+    stride = STRING_SEGMENTS // 4
+    first_bead, last_bead = STRING_SEGMENTS, 0
     while stride > 0:
-        for pull in range(PULLS + 1):
+        for pull in range(STRING_SWEEPS + 1):
             # The first sweep sets the new beads only.
-            for k in range(stride, BEADS, stride if pull > 0 else 2 * stride):
+            for k in range(stride, STRING_SEGMENTS, stride if pull > 0 else 2 * stride):
                 # Gauss-Seidel relaxation: each bead moves to the middle of its neighbours, and out
                 # of the surface.
                 bead = times(
@@ -401,7 +412,7 @@ def start_on_string(p: Floats, turn: float, first: Vector, second: Vector, work:
                             bead, 0.5 * surface_value(p, bead) / dot(gradient, gradient), gradient
                         )
                     # In the last sweep note the first and last bead that touch.
-                    if stride == 1 and pull == PULLS:
+                    if stride == 1 and pull == STRING_SWEEPS:
                         first_bead = min(first_bead, k)
                         last_bead = k
                 store_vector(work, 3 * k, bead)
@@ -431,7 +442,7 @@ def find_tangent(point: Vector, radius: float, normal: Vector, rotation_sense: f
         normal: unit normal of the plane.
         rotation_sense: 1.0 for the tangent point to the left about the normal, -1.0 for that to the right.
     """
-    distance = max(norm(point), LEAST)
+    distance = max(norm(point), MIN_DENOMINATOR)
     cosine = min(radius / distance, 1.0)
     foot = times(radius * cosine / distance, point)
     return add_scaled(

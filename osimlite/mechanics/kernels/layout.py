@@ -29,7 +29,7 @@ class Record(type):
     """
 
     def record(cls, **values: int) -> list[int]:
-        """Return the integers of a record in the order of its fields, up to SIZE or OWN.
+        """Return the integers of a record in the order of its fields, up to SIZE or DETAILS.
 
         Raises:
             TypeError: a field is missing, or an unknown one is given.
@@ -46,7 +46,7 @@ class Record(type):
 def _list_fields(record: Record) -> tuple[str, ...]:
     """Return the names of the fields of a record, sorted by their offsets."""
     numbers = {name: number for name, number in vars(record).items() if name.isupper()}
-    end = numbers["SIZE" if "SIZE" in numbers else "OWN"]
+    end = numbers["SIZE" if "SIZE" in numbers else "DETAILS"]
     offsets = {number: name for name, number in numbers.items() if 0 <= number < end}
     return tuple(offsets[number] for number in range(end))
 
@@ -139,7 +139,7 @@ class OPERATION(metaclass=Record):
         MOTION: type of the motion, see `MOTION`.
         BEFORE: type of the fixed transform before the motion, see `TRANSFORM`.
         DOF: degree of freedom that is the amount of the motion, or -1.
-        FUNCTION: number of the law that gives the amount or the motion of a ball; or ALONE, TOGETHER.
+        FUNCTION: number of the law that gives the amount or the motion of a ball; or SINGLE, TOGETHER.
         ARGUMENTS, ARGUMENT_COUNT: offset in the model and number of the arguments of that law, which
             are degrees of freedom or -1 for a constant one.
         EXTRA: offset in reals of the radii, or of constant arguments and then the function's table.
@@ -147,9 +147,9 @@ class OPERATION(metaclass=Record):
     """
 
     MOTION, BEFORE, DOF, FUNCTION, ARGUMENTS, ARGUMENT_COUNT, EXTRA, GRADIENT, SIZE = range(9)
-    ALONE = -1
+    SINGLE = -1
     """FUNCTION if the column of the degree of freedom comes from this operation only."""
-    TOGETHER = -2
+    SUMMED = -2
     """FUNCTION if the column of the degree of freedom is a sum over several operations."""
 
 
@@ -172,10 +172,10 @@ class ITEM(metaclass=Record):
         LAW: address of the kernel of the item.
         NUMBERS, RECORD: offsets of the item's parameters in reals and of its results in data.
         FIRST_CONTACT: number of the first contact of the force element.
-        OWN: offset of further integers that depend on the kernel.
+        DETAILS: offset of further integers that depend on the kernel.
     """
 
-    LAW, NUMBERS, RECORD, FIRST_CONTACT, OWN = range(5)
+    LAW, NUMBERS, RECORD, FIRST_CONTACT, DETAILS = range(5)
 
 
 class EQUILIBRIUM(metaclass=Record):
@@ -270,10 +270,10 @@ class CONSTRAINT(metaclass=Record):
         LAW, NUMBERS: number of the constraint's law, and offset of its parameters in reals.
         FIRST_EQUATION, END_EQUATION: range of the constraint's equations.
         END_POSITION: end of the equations that constrain positions.
-        OWN: offset of further integers that depend on the law.
+        DETAILS: offset of further integers that depend on the law.
     """
 
-    LAW, NUMBERS, FIRST_EQUATION, END_EQUATION, END_POSITION, OWN = range(6)
+    LAW, NUMBERS, FIRST_EQUATION, END_EQUATION, END_POSITION, DETAILS = range(6)
 
 
 class COORDINATE(metaclass=Record):
@@ -301,12 +301,12 @@ class CHAIN(metaclass=Record):
     """Number of joints."""
     JOINT_AT = next(_at)
     """Offset of the records of the joints, see `JOINT`."""
-    SHARES = next(_at)
+    DERIVATIVES = next(_at)
     """Number of pairs of a joint and a degree of freedom that moves it."""
-    SHARE_AT = next(_at)
-    """Offset of their records, see `SHARE`."""
+    DERIVATIVE_AT = next(_at)
+    """Offset of their records, see `JOINT_DERIVATIVE`."""
     PRODUCTS = next(_at)
-    """Number of products of two shares."""
+    """Number of products of two derivatives."""
     PRODUCT_AT = next(_at)
     """Offset of their records, see `PRODUCT`."""
     EXCESSES = next(_at)
@@ -318,8 +318,8 @@ class CHAIN(metaclass=Record):
 
     The mass matrix of the other program follows them.
     """
-    WORK_SHARES = next(_at)
-    """Offset in data of the values of the shares."""
+    WORK_DERIVATIVES = next(_at)
+    """Offset in data of the values of these derivatives."""
     ENTRY_AT = next(_at)
     """Offset in data of the mass matrix of the degrees of freedom."""
     END_ENTRY = next(_at)
@@ -331,17 +331,17 @@ class JOINT(metaclass=Record):
     """Integers of a joint of another program.
 
     Attributes:
-        KIND: source type, see `JOINT_KIND`.
+        KIND: source type, see `JOINT_SOURCE`.
         SOURCE: index of the degree of freedom or operation that the joint follows.
         PART: component of the operation, or offset in reals of the factor of a degree of freedom.
-        FIRST_SHARE: index of the first share of the joint.
+        FIRST_DERIVATIVE: index of the first derivative of the joint.
     """
 
-    KIND, SOURCE, PART, FIRST_SHARE, SIZE = range(5)
+    KIND, SOURCE, PART, FIRST_DERIVATIVE, SIZE = range(5)
 
 
-class SHARE(metaclass=Record):
-    """Integers of a share: the derivative of a joint by a degree of freedom.
+class JOINT_DERIVATIVE(metaclass=Record):
+    """Integers of the derivative of a joint by a degree of freedom.
 
     Attributes:
         JOINT: number of the joint.
@@ -352,10 +352,10 @@ class SHARE(metaclass=Record):
 
 
 class PRODUCT(metaclass=Record):
-    """Integers of a product of two shares.
+    """Integers of a product of two derivatives of joints.
 
     Attributes:
-        ONE, TWO: numbers of the shares.
+        ONE, TWO: numbers of the derivatives.
         ENTRY: entry of the other program's mass matrix by which the product is multiplied.
         TARGET: offset in data of the entry of the mass matrix that the product is added to.
     """
@@ -375,7 +375,7 @@ class EXCESS(metaclass=Record):
     LINK, DOF, NUMBER, SIZE = range(4)
 
 
-class JOINT_KIND(metaclass=Record):
+class JOINT_SOURCE(metaclass=Record):
     """Sources that a joint of another program can follow.
 
     Attributes:

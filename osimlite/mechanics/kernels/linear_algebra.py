@@ -21,7 +21,7 @@ from osimlite.mechanics.kernels.layout import (
 )
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
 
-REDUNDANT = 1e-9
+REDUNDANCY_TOLERANCE = 1e-9
 """Relative size of the part of an equation beyond the others below which it counts as redundant."""
 ROUNDING = 1e-13
 """Equations shorter than this (m, rad), or than this part of the longest one, are rounding errors."""
@@ -372,7 +372,7 @@ def solve_cholesky(size: int, a: Floats, x: Floats) -> None:
 
 MAX_SWEEPS = 60
 """Largest number of sweeps of Jacobi's method."""
-NEGLIGIBLE = 1e-32
+JACOBI_TOLERANCE = 1e-32
 """Ratio of the squared entries off and on the diagonal at which Jacobi's method ends."""
 
 
@@ -393,7 +393,7 @@ def diagonalize(size: int, a: Floats, vectors: Floats) -> None:
             on_diagonal += a[size * i + i] * a[size * i + i]
             for j in range(i):
                 off_diagonal += a[size * i + j] * a[size * i + j]
-        if not off_diagonal > NEGLIGIBLE * on_diagonal:
+        if not off_diagonal > JACOBI_TOLERANCE * on_diagonal:
             return
         for i in range(size):
             for j in range(i):

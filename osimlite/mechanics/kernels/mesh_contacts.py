@@ -57,10 +57,10 @@ def touch_mesh(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
         `OUTCOME.OK`.
     """
     i = at(model, item)
-    first_link = i[ITEM.OWN]
-    second_link = i[ITEM.OWN + 1]
-    count = i[ITEM.OWN + 3]
-    is_plane = i[ITEM.OWN + 4]
+    first_link = i[ITEM.DETAILS]
+    second_link = i[ITEM.DETAILS + 1]
+    count = i[ITEM.DETAILS + 3]
+    is_plane = i[ITEM.DETAILS + 4]
     p, result = at(reals, i[ITEM.NUMBERS]), at(data, i[ITEM.RECORD])
     for k in range(MESH_WORK):
         result[k] = 0.0
@@ -120,13 +120,14 @@ def apply_mesh_load(
         energy: potential energy (J).
     """
     i = at(model, item)
-    first_link = i[ITEM.OWN]
-    second_link = i[ITEM.OWN + 1]
+    first_link = i[ITEM.DETAILS]
+    second_link = i[ITEM.DETAILS + 1]
     result = at(data, i[ITEM.RECORD])
     contact = at(
         data,
         model[
-            model[model[MODEL.CONTACT_AT] + i[ITEM.FIRST_CONTACT] + i[ITEM.OWN + 2]] + ITEM.RECORD
+            model[model[MODEL.CONTACT_AT] + i[ITEM.FIRST_CONTACT] + i[ITEM.DETAILS + 2]]
+            + ITEM.RECORD
         ],
     )
     store_vector(result, 0, force)

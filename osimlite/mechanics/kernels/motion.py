@@ -205,7 +205,7 @@ def move_links(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -
                 if freedom >= 0:
                     rate = y[size + freedom]
                     column = at(data, model[MODEL.WORK_COLUMN] + 6 * freedom)
-                    if j[OPERATION.FUNCTION] == OPERATION.ALONE:
+                    if j[OPERATION.FUNCTION] == OPERATION.SINGLE:
                         # Only an operation that is a degree of freedom alone may overwrite its
                         # column.
                         set_spatial_vector(column, turn, shift)

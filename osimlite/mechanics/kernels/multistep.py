@@ -82,7 +82,7 @@ _ONES = (1.0,) * WIDTH
 _KAPPA = (0.0, -0.1850, -1.0 / 9.0, -0.0823, -0.0415, 0.0, 0.0, 0.0)
 _SUMS = tuple(sum((1.0 / k for k in range(1, order + 1)), 0.0) for order in range(WIDTH))
 _ADAMS = (1.0, 1 / 2, 5 / 12, 3 / 8, 251 / 720, 95 / 288, 19087 / 60480, 5257 / 17280)
-PREDICTED = (*_ONES, 0.0, *_ADAMS[:-1])
+PREDICTION_WEIGHTS = (*_ONES, 0.0, *_ADAMS[:-1])
 """Weight of each difference in the prediction, for both methods."""
 PSI_WEIGHTS = _SUMS + _ONES
 """Weight of each difference in psi, for both methods."""
@@ -91,7 +91,7 @@ ALPHA = (
     *(1.0 / g for g in _ADAMS),
 )
 """Ratio of the step to the coefficient c, by order, for both methods."""
-DIFFERENCE = _ONES + ALPHA[WIDTH:]
+DIFFERENCE_RATIO = _ONES + ALPHA[WIDTH:]
 """Ratio of the newest difference to d, by order, for both methods."""
 ERROR_CONSTANT = (
     *(
@@ -102,23 +102,23 @@ ERROR_CONSTANT = (
 )
 """Ratio of the error to the newest difference, by order, for both methods."""
 
-ITERATIONS = 4
+MAX_NEWTON_ITERATIONS = 4
 """Largest number of Newton iterations per step."""
-CONVERGED = 0.05
+NEWTON_TOLERANCE = 0.05
 """Accepted error of the iteration relative to the accuracy of the step."""
-SOLVED = 1e-3
+SINGLE_ITERATION_RESIDUAL = 1e-3
 """Residual relative to the accuracy with which one iteration is enough."""
-RENEWED = 20
+MAX_JACOBIAN_AGE = 20
 """Number of steps after which the derivatives are computed anew."""
 SAFETY = 0.8
 """Ratio of the chosen step to the one that would just meet the accuracy."""
-SHRINK = 0.2
+MIN_STEP_FACTOR = 0.2
 """Smallest factor of a change of the step."""
-GROW = 8.0
+MAX_STEP_FACTOR = 8.0
 """Largest factor of a change of the step."""
 MIN_GROWTH = 1.2
 """Smallest factor with which a step is made longer."""
-PATIENCE = 3
+MAX_REJECTIONS = 3
 """Number of consecutive rejections after which the history is dropped, as the motion has a kink."""
 
 
@@ -200,7 +200,7 @@ def try_multistep(
         predict_state(size, method, order, rows, y1, psi)
         # Derivatives are kept over several steps: the iteration converges as long as they are
         # roughly right.
-        if h[MULTISTEP_WORK.AGE] <= 0.0 or h[MULTISTEP_WORK.AGE] > RENEWED:
+        if h[MULTISTEP_WORK.AGE] <= 0.0 or h[MULTISTEP_WORK.AGE] > MAX_JACOBIAN_AGE:
             data[WORK.TIME] = t1
             is_new = linearise_state(model, reals, data, y1, at(y1, size), work, 0.0) == OUTCOME.OK
             h[MULTISTEP_WORK.AGE], h[MULTISTEP_WORK.CONDENSED] = 1.0 if is_new else 0.0, 0.0
@@ -218,7 +218,7 @@ def try_multistep(
     if iterations > 0:
         # The error is a multiple of the newest difference.
         for k in range(size):
-            errors[k] = ERROR_CONSTANT[constants] * DIFFERENCE[constants] * d[k]
+            errors[k] = ERROR_CONSTANT[constants] * DIFFERENCE_RATIO[constants] * d[k]
         error = project_and_measure(model, reals, data, t1, y0, y1, errors, h, 1)
     if not error <= accuracy:
         shorten_step(size, method, h, rows, error / accuracy)
@@ -229,7 +229,7 @@ def try_multistep(
     # The derivative follows from the formula, without another evaluation.
     for k in range(size):
         y1[size + k] = (psi[k] + d[k]) / c
-        newest = DIFFERENCE[constants] * d[k]
+        newest = DIFFERENCE_RATIO[constants] * d[k]
         if method == FORMULAS.BDF:
             # Use differences of the projected states; their derivatives are not projected.
             newest = y1[k]
@@ -253,7 +253,7 @@ def try_multistep(
             rows,
             errors,
             error,
-            SAFETY * (2 * ITERATIONS + 1) / (2 * ITERATIONS + iterations),
+            SAFETY * (2 * MAX_NEWTON_ITERATIONS + 1) / (2 * MAX_NEWTON_ITERATIONS + iterations),
         )
     h[METHOD_WORK.NEXT_STEP] = h[MULTISTEP_WORK.STEP]
     return OUTCOME.OK
@@ -302,7 +302,7 @@ def predict_state(size: int, method: int, order: int, rows: Floats, y: Floats, p
     for k in range(size):
         y[k], psi[k] = rows[k], 0.0
         for i in range(1, order + 1):
-            y[k] += PREDICTED[first + i] * rows[size * i + k]
+            y[k] += PREDICTION_WEIGHTS[first + i] * rows[size * i + k]
             psi[k] += PSI_WEIGHTS[first + i] * rows[size * i + k]
         psi[k] /= ALPHA[first + order]
 
@@ -343,7 +343,7 @@ def iterate_newton(
     change = at(data, model[MODEL.WORK_STATE] + ERRORS * size)
     for k in range(size):
         d[k] = 0.0
-    for iteration in range(ITERATIONS):
+    for iteration in range(MAX_NEWTON_ITERATIONS):
         h[METHOD_WORK.EVALUATED] += 1.0
         data[WORK.TIME] = t
         if call(
@@ -359,7 +359,7 @@ def iterate_newton(
             y1[k] += change[k]
             d[k] += change[k]
         # A tiny residual before the correction makes a second iteration unnecessary.
-        if residual <= SOLVED * h[METHOD_WORK.ACCEPTED]:
+        if residual <= SINGLE_ITERATION_RESIDUAL * h[METHOD_WORK.ACCEPTED]:
             return iteration + 1
         # With outdated, too large derivatives all steps are short: check the residuals too.
         if iteration > 0:
@@ -367,7 +367,7 @@ def iterate_newton(
                 return 0
             rate = max(residual / previous_residual, length / previous_length)
             # Error of the iteration if it continues to converge at this rate.
-            if rate / (1.0 - rate) * length <= CONVERGED * h[METHOD_WORK.ACCEPTED]:
+            if rate / (1.0 - rate) * length <= NEWTON_TOLERANCE * h[METHOD_WORK.ACCEPTED]:
                 return iteration + 1
         previous_residual, previous_length = residual, length
     return 0
@@ -386,11 +386,14 @@ def shorten_step(size: int, method: int, h: Floats, rows: Floats, excess: float)
     h[MULTISTEP_WORK.REFUSED] += 1.0
     h[MULTISTEP_WORK.EQUAL] = 0.0
     # After several rejections the history describes another motion, as before a contact: restart.
-    if h[MULTISTEP_WORK.REFUSED] > PATIENCE:
-        h[METHOD_WORK.NEXT_STEP], h[MULTISTEP_WORK.ORDER] = SHRINK * h[MULTISTEP_WORK.STEP], 0.0
+    if h[MULTISTEP_WORK.REFUSED] > MAX_REJECTIONS:
+        h[METHOD_WORK.NEXT_STEP], h[MULTISTEP_WORK.ORDER] = (
+            MIN_STEP_FACTOR * h[MULTISTEP_WORK.STEP],
+            0.0,
+        )
         return
     factor = SAFETY * excess ** (-1.0 / (h[MULTISTEP_WORK.ORDER] + 1.0)) if excess < inf else 0.25
-    rescale_differences(size, method, h, rows, min(max(factor, SHRINK), SAFETY))
+    rescale_differences(size, method, h, rows, min(max(factor, MIN_STEP_FACTOR), SAFETY))
     h[METHOD_WORK.NEXT_STEP] = h[MULTISTEP_WORK.STEP]
 
 
@@ -432,10 +435,10 @@ def choose_order(
         result = step_factor(error_norm(model, y0, errors, h, 1) / accuracy, candidate)
         if result > factor:
             best, factor = candidate, result
-    factor = min(safety * factor, GROW)
+    factor = min(safety * factor, MAX_STEP_FACTOR)
     if factor >= MIN_GROWTH or factor < 1.0:
         h[MULTISTEP_WORK.ORDER], h[MULTISTEP_WORK.EQUAL] = float(best), 0.0
-        rescale_differences(size, method, h, rows, max(factor, SHRINK))
+        rescale_differences(size, method, h, rows, max(factor, MIN_STEP_FACTOR))
 
 
 def step_factor(excess: float, order: int) -> float:

@@ -54,9 +54,9 @@ class PATH_WRAP(metaclass=Record):
     """Number of integers of a wrap; wraps follow the nodes."""
 
 
-ROUNDS = 8
+MAX_ROUNDS = 8
 """Largest number of rounds."""
-STILL = 0.0005
+LENGTH_TOLERANCE_M = 0.0005
 """Change of the length (m) below which no further round follows."""
 
 
@@ -91,7 +91,7 @@ def wrapped_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
     length = inf
     exchanged = False
     # A single surface does not depend on others, so that one round is enough.
-    for turn in range(ROUNDS if wraps > 1 else 1):
+    for turn in range(MAX_ROUNDS if wraps > 1 else 1):
         first = second = WRAPPING.NONE
         for k in range(wraps):
             result = wrap_surface(
@@ -110,7 +110,7 @@ def wrapped_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
                 second = result
         previous_length = length
         length = measure_points(model, data, y, item)
-        if abs(length - previous_length) < STILL:
+        if abs(length - previous_length) < LENGTH_TOLERANCE_M:
             break
         # OpenSim exchanges the first two wraps if the first does not wrap and the second fails in
         # the first round.

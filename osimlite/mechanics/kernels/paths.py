@@ -30,13 +30,13 @@ from osimlite.mechanics.laws.vectors import (
 class PATH(metaclass=Record):
     """Integers of a path through points."""
 
-    PULL = ITEM.OWN
+    PULL = ITEM.DETAILS
     """Distance back to the item that applies its tension."""
-    POINTS = ITEM.OWN + 1
+    POINTS = ITEM.DETAILS + 1
     """Number of points."""
-    WRAPS = ITEM.OWN + 2
+    WRAPS = ITEM.DETAILS + 2
     """Number of wraps."""
-    NODES_AT = ITEM.OWN + 3
+    NODES_AT = ITEM.DETAILS + 3
     """Nodes: the points, then two tangent points for each wrap."""
 
 
@@ -123,12 +123,12 @@ class NODE_WORK(metaclass=Record):
     """Length of the results of a node."""
 
 
-COINCIDENT = 2.0**-52
+MIN_SPEED_DISTANCE_M = 2.0**-52
 """Distance of two points (m) below which OpenSim has no direction for their relative speed.
 
 The speed is NaN in OpenSim; here it is the norm of the relative velocity.
 """
-SIGNIFICANT = 2.0 ** (-52.0 * 7.0 / 8.0)
+MIN_FORCE_DISTANCE_M = 2.0 ** (-52.0 * 7.0 / 8.0)
 """Distance of two points (m) below which OpenSim has no direction for forces; here they vanish."""
 
 
@@ -303,12 +303,14 @@ def measure_points(model: Ints, data: Floats, y: Floats, item: int) -> float:
             )
             speed += (
                 norm(relative_velocity)
-                if distance < COINCIDENT
+                if distance < MIN_SPEED_DISTANCE_M
                 else dot(relative_velocity, line) / distance
             )
         # Forces along a segment without direction vanish, where OpenSim has NaN.
         store_vector(
-            a, NODE_WORK.ALONG, times(0.0 if distance < SIGNIFICANT else 1.0 / distance, line)
+            a,
+            NODE_WORK.ALONG,
+            times(0.0 if distance < MIN_FORCE_DISTANCE_M else 1.0 / distance, line),
         )
     result[PATH_WORK.LENGTH], result[PATH_WORK.SPEED] = length, speed
     return length

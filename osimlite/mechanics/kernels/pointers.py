@@ -54,7 +54,7 @@ def at(vector: Vector, offset: int) -> Vector:
 
 
 def call(
-    address: int, model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, place: int
+    address: int, model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, offset: int
 ) -> int:
     """Call the law at an address.
 
@@ -65,13 +65,13 @@ def call(
         data: results of an evaluation.
         y: state.
         f: rates of the state.
-        place: number of the law's subject, such as an operation, or offset of an item or
+        offset: number of the law's subject, such as an operation, or offset of an item or
             constraint.
 
     Returns:
         Outcome of the law, see `OUTCOME`.
     """
-    return laws[address](model, reals, data, y, f, place)
+    return laws[address](model, reals, data, y, f, offset)
 
 
 def copy_numbers(count: int, values: Floats, to: Floats) -> None:

@@ -20,11 +20,11 @@ from osimlite.mechanics.kernels.pose_cost import (
 )
 from osimlite.mechanics.kernels.pose_record import COUPLER, FIT, FREEDOM, Fit
 from osimlite.mechanics.kernels.pose_step import gather_free_equations, list_free_coordinates
-from osimlite.mechanics.kernels.projection import REDUNDANT
+from osimlite.mechanics.kernels.projection import INDEPENDENCE
 
-EXACT = 1e-13
+MAX_EQUATION_ERROR = 1e-13
 """Accepted error of the equations (m or rad)."""
-ASIDE = 1e-5
+DIFFERENCE_STEP = 1e-5
 """Step of the finite differences of equations (rad or m)."""
 
 
@@ -94,15 +94,15 @@ def restore_equations(m: Fit, y: Floats) -> bool:
         largest_error = 0.0
         for k in range(count):
             largest_error = max(largest_error, abs(errors[k]))
-        if largest_error <= EXACT:
+        if largest_error <= MAX_EQUATION_ERROR:
             return True
-        # Rounding may keep the errors above EXACT; then the search ends when they stop to halve.
+        # Rounding may keep the errors above MAX_EQUATION_ERROR; then the search ends when they stop to halve.
         if largest_error <= 1e-9 and largest_error >= 0.5 * previous_error:
             return True
         previous_error = largest_error
         free = list_free_coordinates(m)
         factor, right, work = gather_free_equations(m, free, 0)
-        rank = factorise_equations(count, free, factor, REDUNDANT * count)
+        rank = factorise_equations(count, free, factor, INDEPENDENCE * count)
         solve_minimum_norm(count, free, factor, rank, right, work, step)
         furthest = 0.0
         for k in range(free):
@@ -165,9 +165,9 @@ def compute_curvature(m: Fit, y: Floats) -> None:
         freedom = p[p[FIT.FREE_AT] + k]
         # Central differences of the rows, symmetrized by adding half on either side.
         for side in range(2):
-            factor = (0.5 - side) / ASIDE
+            factor = (0.5 - side) / DIFFERENCE_STEP
             copy_numbers(size, y, trial)
-            trial[freedom] += ASIDE if side == 0 else -ASIDE
+            trial[freedom] += DIFFERENCE_STEP if side == 0 else -DIFFERENCE_STEP
             set_dependents(m, trial)
             evaluate_pose(m, trial)
             apply_couplers(m, trial)

@@ -26,13 +26,13 @@ from osimlite.mechanics.kernels.pose_cost import count_equations, evaluate_cost,
 from osimlite.mechanics.kernels.pose_record import FIT, FREEDOM, MARKER_NUMBERS, SENSOR_NUMBERS, Fit
 from osimlite.mechanics.kernels.pose_sensors import sensor_rotation
 from osimlite.mechanics.kernels.pose_starts import (
-    INWARDS,
-    ROUND,
+    RANGE_MARGIN,
+    START_ROTATION_RAD,
     remove_full_turns,
     start_away_from_ends,
     start_full_turn,
     start_inside_ranges,
-    start_turned_subtree,
+    start_rotated_subtree,
     start_upside_down,
 )
 from osimlite.mechanics.kernels.pose_step import (
@@ -48,31 +48,31 @@ FITTED = 0.0
 """Status of a frame with the best pose."""
 UNSEEN = 1.0
 """Status of a frame without measurements, which has the previous pose."""
-STUCK = 2.0
+UNCONVERGED = 2.0
 """Status of a frame whose search ended before it converged."""
 UNASSEMBLED = 3.0
 """Status of a frame with no pose near the previous one that fulfils the constraints."""
-FINEST = 1e-9
+COORDINATE_ACCURACY = 1e-9
 """Accuracy of the coordinates, as estimated from the decrease of the steps (rad or m)."""
-MOST_STEPS = 200
+MAX_STEPS = 200
 """Largest number of steps of a descent."""
-LIGHTEST = 1e-10
+MIN_DAMPING = 1e-10
 """Smallest damping of a step."""
-HEAVIEST = 1e12
+MAX_DAMPING = 1e12
 """Largest damping of a step."""
 FIRST_DAMPING = 1e-4
 """Damping of the first step that is to be short."""
-VAGUE = 1e-7
+MIN_DAMPING_IF_FLAT = 1e-7
 """Smallest damping where several poses fit alike."""
 MIN_PIVOT = 1e-7
 """Smallest pivot relative to the stiffness with which no poses fit alike."""
 SMALL_STEPS = 1e-2
 """Damping of the first step of a descent by small steps."""
-PATIENCE = 8
+GAUSS_NEWTON_STEPS = 8
 """Number of steps after which the complete Hessian is used in any case."""
-POSES = 2
+PREVIOUS_POSES = 2
 """Number of previous poses that are kept for extrapolation."""
-RENEWED = 5
+STEPS_WITHOUT_CURVATURE = 5
 """Number of steps after which the curvature of the equations is computed, which few poses need."""
 
 
@@ -167,13 +167,13 @@ def fit_frame(m: Fit, y: Floats) -> tuple[float, int, float]:
         if fulfil_constraints(m, trial):
             value = evaluate_cost(m, trial)
     # If the extrapolated pose costs much more than the previous one, compare it with that.
-    if not value < 4.0 * history[1 + POSES * size] + 1e-8:
+    if not value < 4.0 * history[1 + PREVIOUS_POSES * size] + 1e-8:
         last_cost = evaluate_cost(m, y)
         if not value < last_cost:
             copy_numbers(size, y, trial)
         value = last_cost if not value < last_cost else evaluate_cost(m, trial)
-    lightest = VAGUE if is_vague else LIGHTEST
-    start = at(history, 2 + POSES * size)
+    lightest = MIN_DAMPING_IF_FLAT if is_vague else MIN_DAMPING
+    start = at(history, 2 + PREVIOUS_POSES * size)
     if previous_count == 0:
         copy_numbers(size, trial, last_pose)
     copy_numbers(size, trial, start)
@@ -186,14 +186,18 @@ def fit_frame(m: Fit, y: Floats) -> tuple[float, int, float]:
         )
         steps += added_steps
         for inwards in range(2):
-            start_away_from_ends(m, last_pose, start, 2.0 * INWARDS * (1 + inwards))
+            start_away_from_ends(m, last_pose, start, 2.0 * RANGE_MARGIN * (1 + inwards))
             value, added_steps, status = descend_from_start(
                 m, start, y, value, status, SMALL_STEPS, lightest
             )
             steps += added_steps
         for number in range(2 * size):
-            if start_turned_subtree(
-                m, last_pose, start, number // 2, ROUND if number % 2 == 0 else -ROUND
+            if start_rotated_subtree(
+                m,
+                last_pose,
+                start,
+                number // 2,
+                START_ROTATION_RAD if number % 2 == 0 else -START_ROTATION_RAD,
             ):
                 value, added_steps, status = descend_from_start(
                     m, start, y, value, status, SMALL_STEPS, lightest
@@ -232,7 +236,10 @@ def fit_frame(m: Fit, y: Floats) -> tuple[float, int, float]:
         # A full turn, from one end of a range to the other, is no motion to extrapolate.
         earlier_pose[k] = last_pose[k] + 2.0 * pi * floor((y[k] - last_pose[k]) / (2.0 * pi) + 0.5)
     copy_numbers(size, y, last_pose)
-    history[0], history[1 + POSES * size] = min(previous_count + 1.0, float(POSES)), value
+    history[0], history[1 + PREVIOUS_POSES * size] = (
+        min(previous_count + 1.0, float(PREVIOUS_POSES)),
+        value,
+    )
     evaluate_pose(m, y)
     return value, steps, status
 
@@ -275,7 +282,7 @@ def update_measured_pattern(m: Fit, y: Floats) -> None:
         v[p[FIT.STEP] + k] = 0.0
     # A Gauss-Newton matrix that is singular leaves some direction undetermined.
     pattern[count] = (
-        1.0 if solve_free(m, list_free_coordinates(m), LIGHTEST, 0.0, MIN_PIVOT) < 0 else 0.0
+        1.0 if solve_free(m, list_free_coordinates(m), MIN_DAMPING, 0.0, MIN_PIVOT) < 0 else 0.0
     )
 
 
@@ -408,21 +415,21 @@ def descend_to_minimum(
     size = m.model[MODEL.DOFS]
     step = at(v, p[FIT.STEP])
     previous_length = inf
-    bends = damping == LIGHTEST
-    status = STUCK
+    bends = damping == MIN_DAMPING
+    status = UNCONVERGED
     copy_numbers(size, start, y)
     steps = 0
     clear_curvature(m)
-    while steps < MOST_STEPS:
+    while steps < MAX_STEPS:
         steps += 1
-        if count_equations(m) > 0 and steps % RENEWED == 0:
+        if count_equations(m) > 0 and steps % STEPS_WITHOUT_CURVATURE == 0:
             compute_curvature(m, y)
             evaluate_cost(m, y)
         find_active_range_ends(m, y)
         # Without a convex model, add damping; the Gauss-Newton model needs little.
         if not find_step(m, y, damping, bends) and not find_step(m, y, damping, False):
             damping = max(10.0 * damping, FIRST_DAMPING)
-            if damping > HEAVIEST:
+            if damping > MAX_DAMPING:
                 break
             continue
         length = 0.0
@@ -438,8 +445,8 @@ def descend_to_minimum(
             # estimated by a geometric series.
             value = new
             shrinking = length / previous_length if previous_length < inf else 1.0
-            if length <= FINEST or (
-                shrinking < 0.5 and length * shrinking <= FINEST * (1.0 - shrinking)
+            if length <= COORDINATE_ACCURACY or (
+                shrinking < 0.5 and length * shrinking <= COORDINATE_ACCURACY * (1.0 - shrinking)
             ):
                 status = FITTED
                 break
@@ -447,16 +454,18 @@ def descend_to_minimum(
             damping = max(0.1 * damping, lightest)
             # Where poses fit alike, use the complete Hessian last: far from the minimum it is
             # misleading.
-            bends = steps >= PATIENCE or (damping < FIRST_DAMPING and lightest == LIGHTEST)
+            bends = steps >= GAUSS_NEWTON_STEPS or (
+                damping < FIRST_DAMPING and lightest == MIN_DAMPING
+            )
         else:
-            if length <= 10.0 * FINEST:
+            if length <= 10.0 * COORDINATE_ACCURACY:
                 # No better pose can be distinguished from this one.
                 status = FITTED
                 break
             damping = max(10.0 * damping, FIRST_DAMPING)
-            bends = steps >= PATIENCE
+            bends = steps >= GAUSS_NEWTON_STEPS
             previous_length = inf
-            if damping > HEAVIEST:
+            if damping > MAX_DAMPING:
                 break
             evaluate_cost(m, y)
     return value, steps, status

@@ -33,7 +33,7 @@ from osimlite.mechanics.laws.vectors import (
     vector,
 )
 
-SMALL = 1e-3
+SMALL_ANGLE_RAD = 1e-3
 """Angle (rad) below which c = 1/12 is as accurate as its formula."""
 NEARLY_BACK = -0.99
 """Cosine below which the axis of a rotation follows from its symmetric part, as the other vanishes."""
@@ -89,7 +89,7 @@ def squared_factor(angle: float) -> float:
     Args:
         angle: angle a of the rotation (rad).
     """
-    if angle < SMALL:
+    if angle < SMALL_ANGLE_RAD:
         return 1.0 / 12.0
     sine, cosine = sine_cosine(0.5 * angle)
     return (1.0 - 0.5 * angle * cosine / sine) / (angle * angle)

@@ -12,14 +12,14 @@ from osimlite.mechanics.kernels.pose_cost import evaluate_cost, evaluate_pose
 from osimlite.mechanics.kernels.pose_record import FIT, FREEDOM, Fit
 from osimlite.mechanics.laws.vectors import dot, vector
 
-INWARDS = 0.3
+RANGE_MARGIN = 0.3
 """Distance of coordinates from the ends of their ranges at another start (rad or m)."""
-ROUND = 0.75 * pi
+START_ROTATION_RAD = 0.75 * pi
 """Angle by which the first pose is turned in ground, either way (rad).
 
 A range may end just before half a turn.
 """
-SAME = 1e-9
+RANGE_END_TOLERANCE = 1e-9
 """Distance from an end of a range below which a coordinate counts as at the end (rad or m)."""
 
 
@@ -41,7 +41,7 @@ def start_away_from_ends(m: Fit, from_pose: Floats, start: Floats, inwards: floa
             start[k] = min(max(start[k], low + inner), high - inner)
 
 
-def start_turned_subtree(
+def start_rotated_subtree(
     m: Fit, from_pose: Floats, start: Floats, freedom: int, angle: float
 ) -> bool:
     """Write a start in which the subtree of a joint to ground is turned about the vertical.
@@ -61,7 +61,7 @@ def start_turned_subtree(
     model = m.model
     p = m.p
     ranges = at(m.c, m.p[FIT.RANGES_AT])
-    start_away_from_ends(m, from_pose, start, 2.0 * INWARDS)
+    start_away_from_ends(m, from_pose, start, 2.0 * RANGE_MARGIN)
     start[freedom] += angle
     is_inside = ranges[2 * freedom] <= start[freedom] <= ranges[2 * freedom + 1]
     if not (
@@ -119,7 +119,9 @@ def is_at_end(m: Fit, y: Floats, freedom: int) -> bool:
     low = ranges[2 * freedom]
     high = ranges[2 * freedom + 1]
     # A coordinate whose range is a single value is at both ends, and has no other start.
-    return high - low < inf and (y[freedom] <= low + SAME) != (y[freedom] >= high - SAME)
+    return high - low < inf and (y[freedom] <= low + RANGE_END_TOLERANCE) != (
+        y[freedom] >= high - RANGE_END_TOLERANCE
+    )
 
 
 def start_full_turn(m: Fit, y: Floats, start: Floats, freedom: int) -> bool:
@@ -143,12 +145,14 @@ def start_full_turn(m: Fit, y: Floats, start: Floats, freedom: int) -> bool:
     low = ranges[2 * freedom]
     high = ranges[2 * freedom + 1]
     if not is_at_end(m, y, freedom) or not (
-        high - low > pi + SAME or joint_to_ground(m, freedom) >= 0
+        high - low > pi + RANGE_END_TOLERANCE or joint_to_ground(m, freedom) >= 0
     ):
         return False
     copy_numbers(m.model[MODEL.DOFS], y, start)
     start[freedom] = (
-        min(high, low + 2.0 * pi) if y[freedom] <= low + SAME else max(low, high - 2.0 * pi)
+        min(high, low + 2.0 * pi)
+        if y[freedom] <= low + RANGE_END_TOLERANCE
+        else max(low, high - 2.0 * pi)
     )
     evaluate_pose(m, y)
     return is_angle(m, freedom)
@@ -204,7 +208,7 @@ def start_inside_ranges(m: Fit, y: Floats, start: Floats) -> bool:
         low, high, start[k] = ranges[2 * k], ranges[2 * k + 1], y[k]
         # The descent marks coordinates that it stopped at an end of their range.
         if m.p[m.p[FIT.RESOLVED_AT] + k] == FREEDOM.AT_END and low < high:
-            inwards = min(INWARDS, 0.5 * (high - low))
+            inwards = min(RANGE_MARGIN, 0.5 * (high - low))
             start[k], result = low + inwards if y[k] <= low else high - inwards, True
     return result
 

@@ -17,11 +17,11 @@ from osimlite.mechanics.kernels.linear_algebra import (
 from osimlite.mechanics.kernels.pointers import Floats, at
 from osimlite.mechanics.kernels.pose_cost import count_equations
 from osimlite.mechanics.kernels.pose_record import FIT, FREEDOM, Fit
-from osimlite.mechanics.kernels.projection import REDUNDANT
+from osimlite.mechanics.kernels.projection import INDEPENDENCE
 
-SMALLEST = 1e-14
+MIN_PIVOT = 1e-14
 """Smallest pivot relative to the stiffness with which the model counts as convex."""
-SOFTEST = 0.01
+ADDED_STIFFNESS = 0.01
 """Stiffness (m²/rad²) that is added to that of a coordinate where a step is damped."""
 
 
@@ -127,7 +127,7 @@ def find_step(m: Fit, y: Floats, damping: float, bends: bool) -> bool:
     # are solved again.
     while True:
         free = list_free_coordinates(m)
-        solution = solve_free(m, free, damping, 1.0 if bends else 0.0, SMALLEST)
+        solution = solve_free(m, free, damping, 1.0 if bends else 0.0, MIN_PIVOT)
         if solution < 0:
             return False
         result = at(v, solution)
@@ -196,7 +196,7 @@ def solve_free(m: Fit, free: int, damping: float, curvature_factor: float, small
                 matrix[free * k + j] += curvature_factor * constraint_row[column]
         # Levenberg-Marquardt damping relative to the stiffness, plus a part for coordinates without
         # any.
-        matrix[free * k + k] += damping * (row[freedom] + SOFTEST)
+        matrix[free * k + k] += damping * (row[freedom] + ADDED_STIFFNESS)
     if count == 0:
         if not factorise_cholesky(free, matrix, smallest):
             return -1
@@ -227,7 +227,7 @@ def solve_constrained(m: Fit, free: int, offset: int, smallest: float) -> int:
     reduced = at(directions, size * size)
     # The shortest step that restores the equations; the rest moves in their null space.
     factor, right, work = gather_free_equations(m, free, 1)
-    rank = factorise_equations(count, free, factor, REDUNDANT * count)
+    rank = factorise_equations(count, free, factor, INDEPENDENCE * count)
     solve_minimum_norm(count, free, factor, rank, right, work, across)
     dimension = free - rank
     write_null_space(free, factor, rank, directions)

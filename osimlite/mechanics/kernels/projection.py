@@ -17,13 +17,13 @@ from osimlite.mechanics.kernels.linear_algebra import factorise_by_law, solve_by
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
 from osimlite.mechanics.laws.rotations import sine_cosine
 
-OVERSHOOT = 0.1
+TARGET_FRACTION = 0.1
 """Part of the tolerance that a projection aims at."""
-FINEST = 2.0 ** (-52.0 * 7.0 / 8.0)
+ROUNDING_ERROR = 2.0 ** (-52.0 * 7.0 / 8.0)
 """Errors of constraints below this are rounding: Simbody's significant part of a double (Real), eps^(7/8)."""
-REDUNDANT = 2.0**-26
+INDEPENDENCE = 2.0**-26
 """Threshold of independence per equation, see `factorise_equations`."""
-ITERATIONS = 20
+MAX_NEWTON_STEPS = 20
 """Largest number of Newton steps of a projection."""
 
 
@@ -132,11 +132,11 @@ def project_values(
     # Also true for NaN.
     if not norm <= limit:
         return OUTCOME.FAR
-    for iteration in range(ITERATIONS):
+    for iteration in range(MAX_NEWTON_STEPS):
         write_position_jacobian(model, data, y, jacobian)
         for k in range(count * size):
             factor[k] = jacobian[k]
-        factorise_by_law(model, data, count, factor, REDUNDANT * count)
+        factorise_by_law(model, data, count, factor, INDEPENDENCE * count)
         solve_by_law(model, count, factor, errors, work, step)
         for k in range(size):
             # Speeds are copied, since the evaluation of velocities needs a complete state.
@@ -151,7 +151,7 @@ def project_values(
             break
         for k in range(size):
             y[k] = trial_state[k]
-        if norm <= max(OVERSHOOT * tolerance, FINEST):
+        if norm <= max(TARGET_FRACTION * tolerance, ROUNDING_ERROR):
             break
     if not norm <= tolerance:
         return OUTCOME.FAR
@@ -208,14 +208,14 @@ def project_speeds(
     for i in range(count):
         for k in range(size):
             factor[size * i + k] = scales[k] * rows[size * i + k]
-    factorise_by_law(model, data, count, factor, REDUNDANT * count)
+    factorise_by_law(model, data, count, factor, INDEPENDENCE * count)
     # G does not depend on the speeds: one step is enough, a second one removes its rounding errors.
     for _ in range(2):
         solve_by_law(model, count, factor, errors, work, step)
         for k in range(size):
             u[k] -= scales[k] * step[k]
         norm = compute_speed_errors(model, data, u, errors)
-        if norm <= max(OVERSHOOT * tolerance, FINEST):
+        if norm <= max(TARGET_FRACTION * tolerance, ROUNDING_ERROR):
             break
     if not norm <= tolerance:
         return OUTCOME.FAR

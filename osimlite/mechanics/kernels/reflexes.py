@@ -52,7 +52,7 @@ OF_GATE = 2
 """Number of integers of a gate."""
 OF_EACH = 3
 """Number of numbers of a term, and of a gate."""
-NEAR = 1e-9
+STEP_TOLERANCE = 1e-9
 """A delay this near to whole control steps counts as whole, as it was divided by the step."""
 
 
@@ -185,7 +185,7 @@ def interpolate_sensor(i: Ints, frames: int, history: Floats, sensor: int, delay
     # Before the start a delayed sensor has its first value.
     delay_frames = min(delay, frames - 1.0)
     latest = frames - 1
-    full_frames = floor(delay_frames + NEAR)
+    full_frames = floor(delay_frames + STEP_TOLERANCE)
     fraction = min(max(delay_frames - full_frames, 0.0), 1.0)
     frame = int(latest - full_frames)
     size, width = i[REFLEXES.HISTORY_LENGTH], i[REFLEXES.SENSORS]
@@ -334,7 +334,7 @@ def add_reflexes(
         else:
             since = frames - 1.0 - term_numbers[0]
             # The term begins at its delay, up to rounding.
-            if since < -NEAR:
+            if since < -STEP_TOLERANCE:
                 continue
             for _ in range(term[TERM.KIND]):
                 value *= since

@@ -82,20 +82,22 @@ STAGE_STATES = tuple(value for row in ALPHA for value in _divide_by_gamma(row))
 In terms of the transformed stages no product with J occurs (E. Hairer, G. Wanner, Solving Ordinary
 Differential Equations II, chapter IV.7).
 """
-CARRIED = tuple(-DIAGONAL * value for row in UNIT for value in _divide_by_gamma(row))
+RIGHT_SIDE_WEIGHTS = tuple(-DIAGONAL * value for row in UNIT for value in _divide_by_gamma(row))
 """Coefficients of the transformed earlier stages on the right side of a stage, by rows."""
-ENDS = _divide_by_gamma(WEIGHTS)
+RESULT_WEIGHTS = _divide_by_gamma(WEIGHTS)
 """Coefficients of the transformed stages in the result."""
-MISSES = _divide_by_gamma(tuple(one - other for one, other in zip(WEIGHTS, EMBEDDED, strict=True)))
+ERROR_WEIGHTS = _divide_by_gamma(
+    tuple(one - other for one, other in zip(WEIGHTS, EMBEDDED, strict=True))
+)
 """Coefficients of the transformed stages in the error estimate."""
-TIMES = tuple(sum(row) for row in ALPHA)
+STAGE_TIMES = tuple(sum(row) for row in ALPHA)
 """Times of the stages, as part of the step; at 0 the derivative is known."""
 
 SAFETY = 0.9
 """Ratio of the chosen step to the one that would just meet the accuracy."""
-SHRINK = 0.2
+MIN_STEP_FACTOR = 0.2
 """Smallest factor of a change of the step."""
-GROW = 5.0
+MAX_STEP_FACTOR = 5.0
 """Largest factor of a change of the step."""
 MIN_GROWTH = 1.1
 """Smallest factor with which a step is made longer."""
@@ -151,20 +153,20 @@ def rosenbrock(
         for k in range(size):
             y1[k], errors[k] = y0[k], 0.0
             for i in range(STAGES):
-                y1[k] += ENDS[i] * stages[size * i + k]
-                errors[k] += MISSES[i] * stages[size * i + k]
+                y1[k] += RESULT_WEIGHTS[i] * stages[size * i + k]
+                errors[k] += ERROR_WEIGHTS[i] * stages[size * i + k]
         error = project_and_measure(model, reals, data, t1, y0, y1, errors, h, 1)
     # The error has order 3, and is bounded from below so that the factor stays finite.
     factor = SAFETY * (accuracy / max(error, 1e-9 * accuracy)) ** (1.0 / 3.0)
     if not error <= accuracy:
         # Near the resolution of time, the actual step is longer than the requested one.
         h[METHOD_WORK.NEXT_STEP] = min(
-            max(factor, SHRINK) * step, SAFETY * h[METHOD_WORK.NEXT_STEP]
+            max(factor, MIN_STEP_FACTOR) * step, SAFETY * h[METHOD_WORK.NEXT_STEP]
         )
         return OUTCOME.OK
     h[METHOD_WORK.REACHED], h[ROSENBROCK_WORK.IS_NEW] = t1, 0.0
     if factor < 1.0 or (factor >= MIN_GROWTH and not cut):
-        h[METHOD_WORK.NEXT_STEP] = min(factor, GROW) * step
+        h[METHOD_WORK.NEXT_STEP] = min(factor, MAX_STEP_FACTOR) * step
     return OUTCOME.OK
 
 
@@ -201,14 +203,14 @@ def compute_stages(
     f = at(y, model[MODEL.STATE_SIZE])
     for i in range(STAGES):
         stage = at(stages, size * i)
-        rates = f if TIMES[i] > 0.0 else at(y0, size)
+        rates = f if STAGE_TIMES[i] > 0.0 else at(y0, size)
         # Stages at the start use the derivative that is known there.
-        if TIMES[i] > 0.0:
+        if STAGE_TIMES[i] > 0.0:
             for k in range(size):
                 y[k] = y0[k]
                 for j in range(i):
                     y[k] += STAGE_STATES[STAGES * i + j] * stages[size * j + k]
-            data[WORK.TIME] = t0 + TIMES[i] * step
+            data[WORK.TIME] = t0 + STAGE_TIMES[i] * step
             if call(
                 model[MODEL.LAWS], model, reals, data, y, f, STAGE.ACCELERATION
             ) != OUTCOME.OK or not is_finite(size, f):
@@ -216,6 +218,6 @@ def compute_stages(
         for k in range(size):
             stage[k] = c * rates[k]
             for j in range(i):
-                stage[k] += CARRIED[STAGES * i + j] * stages[size * j + k]
+                stage[k] += RIGHT_SIDE_WEIGHTS[STAGES * i + j] * stages[size * j + k]
         solve_condensed(model, c, work, stage)
     return True

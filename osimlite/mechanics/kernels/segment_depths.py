@@ -23,17 +23,17 @@ from osimlite.mechanics.laws.vectors import (
     vector,
 )
 
-LEAST = 1e-100
+MIN_DENOMINATOR = 1e-100
 """Smallest denominator, so that nothing is divided by zero."""
 SAMPLES = 16
 """Number of intervals in the search for the point of a segment nearest to a ring."""
-STEPS = 6
+NEWTON_STEPS = 6
 """Number of Newton steps that refine this point."""
 NEAR_MIDDLE = 0.3
 """Depth (see `squared_depth`) below which a line passes near the middle of a sphere."""
 DIRECTIONS = 16
 """Number of directions across a line that are tried on an ellipsoid."""
-WORTHWHILE = 1.5
+MAX_DEPTH_RATIO = 1.5
 """Largest ratio of depths with which the second best direction is tried."""
 
 
@@ -61,14 +61,14 @@ def count_directions(p: Floats, first: Vector, second: Vector, is_alone: bool) -
         return 1
     chord, weights = minus(second, first), vector(p, SURFACE.WEIGHTS)
     fraction = -dot(multiply_elementwise(weights, first), chord) / max(
-        dot(multiply_elementwise(weights, chord), chord), LEAST
+        dot(multiply_elementwise(weights, chord), chord), MIN_DENOMINATOR
     )
     x, y, z = weights
     second_direction = outward_direction(
         (sqrt(1.0 / x), sqrt(1.0 / y), sqrt(1.0 / z)),
         add_scaled(first, fraction, chord),
         chord,
-        WORTHWHILE,
+        MAX_DEPTH_RATIO,
     )
     return 2 if dot(second_direction, second_direction) > 0.0 else 1
 
@@ -92,7 +92,8 @@ def squared_depth(p: Floats, first: Vector, second: Vector) -> float:
     square = dot(multiply_elementwise(weights, chord), chord)
     # In scaled coordinates the surface is a unit sphere, and the nearest point is a projection.
     fraction = min(
-        max(-dot(multiply_elementwise(weights, first), chord) / max(square, LEAST), 0.0), 1.0
+        max(-dot(multiply_elementwise(weights, first), chord) / max(square, MIN_DENOMINATOR), 0.0),
+        1.0,
     )
     middle = add_scaled(first, fraction, chord)
     return dot(multiply_elementwise(weights, middle), middle) / (
@@ -184,9 +185,9 @@ def nearest_to_ring(ring: float, first: Vector, second: Vector) -> Vector:
         if distance < least:
             best = k / SAMPLES
             least = distance
-    for _ in range(STEPS):
+    for _ in range(NEWTON_STEPS):
         x, y, z = add_scaled(first, best, chord)
-        square = max(x * x + y * y, LEAST)
+        square = max(x * x + y * y, MIN_DENOMINATOR)
         outer = sqrt(square)
         flat = x * wx + y * wy
         slope = flat * (1.0 - ring / outer) + z * wz

@@ -27,9 +27,9 @@ from osimlite.mechanics.laws.vectors import (
     vector,
 )
 
-ANGLE = 0.15
+MAX_ANGLE_RAD = 0.15
 """Largest angle between neighbouring points (rad); the polyline is within 0.3 % of the radius."""
-MOST = 60.0
+MAX_SEGMENTS = 60.0
 """Largest number of segments on a surface."""
 
 
@@ -96,7 +96,7 @@ def trace_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
 def count_segments(angle: float) -> int:
     """Return the number of segments with which an angle (rad) is drawn."""
     # An undefined angle is drawn as one line.
-    return int(min(1.0 + abs(angle) / ANGLE, MOST)) if not isnan(angle) else 1
+    return int(min(1.0 + abs(angle) / MAX_ANGLE_RAD, MAX_SEGMENTS)) if not isnan(angle) else 1
 
 
 def trace_cylinder(

@@ -37,17 +37,17 @@ from osimlite.mechanics.laws.vectors import (
     vector,
 )
 
-PARALLEL = 2e-13
+PARALLEL_TOLERANCE = 2e-13
 """Squared sine of the angle between two lines up to which OpenSim treats them as parallel."""
-FLATTEST = 5e-7
+MIN_AXIAL_COMPONENT = 5e-7
 """Smallest axial component of a plane's normal with which an edge intersects the plane."""
-FARTHEST = 10.0002
+MAX_EDGE_DISTANCE_M = 10.0002
 """Largest distance along the edge to that intersection (m)."""
-PIECE = 0.002
+SEGMENT_LENGTH_M = 0.002
 """Length of the segments that OpenSim draws the helix with (m)."""
-BEND = tan(radians(0.1))
+MAX_BEND_TANGENT = tan(radians(0.1))
 """Tangent of the largest angle between a line and the helix where they meet."""
-ROUNDS = 100
+MAX_ROUNDS = 100
 """Largest number of rounds in the search for such heights."""
 
 
@@ -197,7 +197,7 @@ def closest_to_axis(first: Vector, second: Vector, radius: float) -> tuple[Vecto
     dx, dy, dz = chord = minus(second, first)
     across = dx * dx + dy * dy
     # OpenSim treats a line along the axis as one that does not cross.
-    if across <= PARALLEL * (across + dz * dz):
+    if across <= PARALLEL_TOLERANCE * (across + dz * dz):
         return (0.0, 0.0, 0.0), False
     fraction = -(x * dx + y * dy) / across
     x, y, _ = closest = add_scaled(first, fraction, chord)
@@ -276,12 +276,12 @@ def edge_height(point: Vector, end_height: float, end: Vector, normal: Vector) -
     """
     nx, ny, nz = normal
     # OpenSim treats an edge nearly parallel to the plane as one that does not meet it.
-    if abs(nz) < FLATTEST:
+    if abs(nz) < MIN_AXIAL_COMPONENT:
         return end_height
     dx, dy, _ = minus(end, point)
     _, _, height = end
     z = height + (dx * nx + dy * ny) / nz
-    return z if abs(z - end_height) <= FARTHEST else end_height
+    return z if abs(z - end_height) <= MAX_EDGE_DISTANCE_M else end_height
 
 
 def helix_length(arc: float, rise: float) -> float:
@@ -325,9 +325,9 @@ def smooth_heights(
     x2, y2, z2 = second_tangent
     pieces, fraction = 0, 0.0
     leg1 = leg2 = (0.0, 0.0, 0.0, 0.0)
-    for _ in range(ROUNDS):
+    for _ in range(MAX_ROUNDS):
         rise = z2 - z1
-        length = helix_length(arc, rise) / PIECE
+        length = helix_length(arc, rise) / SEGMENT_LENGTH_M
         # Helices of less than two of OpenSim's segments, and undefined ones, stay as they are.
         if not 2.0 <= length < inf:
             break
@@ -387,7 +387,9 @@ def next_height(
     line, piece, with_next, with_end = leg
     line_rise, piece_rise = tangent - end, next_point - tangent
     # Tangent of the angle between line and helix, without a division.
-    if abs(line * piece_rise - line_rise * piece) <= BEND * (line_rise * piece_rise + line * piece):
+    if abs(line * piece_rise - line_rise * piece) <= MAX_BEND_TANGENT * (
+        line_rise * piece_rise + line * piece
+    ):
         return tangent
     # OpenSim over-relaxes by the factor 3/2.
     return with_next * next_point + (with_end * end - 0.5 * tangent)

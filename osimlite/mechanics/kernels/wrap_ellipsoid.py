@@ -45,25 +45,25 @@ from osimlite.mechanics.laws.vectors import (
     vector,
 )
 
-CLOSE = 1e-4
+SURFACE_TOLERANCE = 1e-4
 """Height at which an end counts as on the surface; also 1 - cosine of ends in one direction."""
 ALL_FAN = 0.7073
 """Cosine of the angle between chord and axis up to which only the fan is used."""
 NO_FAN = 0.9
 """Cosine from which on the fan is not used."""
-BORDER = 0.3
+FAN_PHASE_IN = 0.3
 """Part of the chord at either end in which the fan is phased in."""
-PIECE = 0.001
+SEGMENT_LENGTH_M = 0.001
 """Length of the straight segments of the path on the surface in OpenSim (m)."""
-PIECES = 499
+MAX_SEGMENTS = 499
 """Largest number of these segments."""
-EXACT = 1e-8
+TANGENT_TOLERANCE = 1e-8
 """Sum of squares at which the search for a tangent point ends."""
-ROUNDS = 50
+MAX_ROUNDS = 50
 """Largest number of rounds of this search."""
-TRIALS = 1000
+MAX_TRIALS = 1000
 """Largest number of trials in a round."""
-STEPS = 16.0
+STEP_DIVISOR = 16.0
 """Divisor of a step of this search."""
 
 
@@ -93,14 +93,16 @@ def wrap_ellipsoid(
     first = times(factor, vector(e, WRAP_WORK.FIRST_END))
     second = times(factor, vector(e, WRAP_WORK.SECOND_END))
     first_height, second_height = ellipsoid_height(radii, first), ellipsoid_height(radii, second)
-    if first_height < -CLOSE or second_height < -CLOSE:
+    if first_height < -SURFACE_TOLERANCE or second_height < -SURFACE_TOLERANCE:
         return WRAPPING.INSIDE
     chord = minus(first, second)
     enters, leaves = find_crossings(radii, second, chord)
     first_tangent = add_scaled(second, enters, chord)
     second_tangent = add_scaled(second, leaves, chord)
     # Ends in the same direction have no plane; a chord outside of the segment does not cross.
-    if abs(dot(unit(first), unit(second)) - 1.0) < CLOSE or not (enters < 1.0 and leaves > 0.0):
+    if abs(dot(unit(first), unit(second)) - 1.0) < SURFACE_TOLERANCE or not (
+        enters < 1.0 and leaves > 0.0
+    ):
         return WRAPPING.NONE
     support, by_fan, starts = support_point(
         p[WRAP_SURFACE.METHOD],
@@ -125,12 +127,12 @@ def wrap_ellipsoid(
     # An end on the surface is its own tangent point.
     first_tangent = (
         tangent_point(radii, first_tangent, first, normal, offset)
-        if abs(first_height) >= CLOSE
+        if abs(first_height) >= SURFACE_TOLERANCE
         else first
     )
     second_tangent = (
         tangent_point(radii, second_tangent, second, normal, offset)
-        if abs(second_height) >= CLOSE
+        if abs(second_height) >= SURFACE_TOLERANCE
         else second
     )
 
@@ -141,8 +143,8 @@ def wrap_ellipsoid(
     store_vector(e, WRAP_WORK.CURVE, normal)
     e[WRAP_WORK.CURVE + 3], e[WRAP_WORK.CURVE + 4] = offset, 0.0
     # A short path is measured by its chord, a long one by a polyline as OpenSim draws it.
-    if length >= PIECE:
-        pieces = int(min(length / PIECE, 1.0 * PIECES))
+    if length >= SEGMENT_LENGTH_M:
+        pieces = int(min(length / SEGMENT_LENGTH_M, 1.0 * MAX_SEGMENTS))
         length, after_first, before_second = measure_polyline(
             radii, first_tangent, second_tangent, normal, offset, pieces, False
         )
@@ -234,7 +236,7 @@ def support_point(
         return axial, 0.0, 0.0 < passes < 1.0
     cosine = abs(component(unit(ray), axis))
     # Where the chord crosses this plane near one of its ends, the fan is phased in.
-    fade = max(0.0, min(passes, 1.0 - passes) / BORDER)
+    fade = max(0.0, min(passes, 1.0 - passes) / FAN_PHASE_IN)
     if cosine > ALL_FAN and fade < 1.0:
         cosine = ALL_FAN + fade * (cosine - ALL_FAN)
     if cosine >= NO_FAN:
@@ -286,16 +288,16 @@ def tangent_point(
     e0, e1, e2, e3 = tangent_residuals(weights, by_end, normal, offset, r, d)
     error = previous_error = e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3
     damping = 0.01
-    for _ in range(ROUNDS):
-        if not error > EXACT:
+    for _ in range(MAX_ROUNDS):
+        if not error > TANGENT_TOLERANCE:
             break
         n = times(2.0, multiply_elementwise(weights, r))
         downhill = minus(times(-e0, normal), add_scaled(times(e1 + 2.0 * e2, n), e3, by_end))
         cosine = dot(unit(minus(end, r)), unit(end))
         # OpenSim takes small steps where the end is seen under a large angle.
-        size = (1.0 - cosine**100 if cosine > 0.1 else 1.0) / STEPS
+        size = (1.0 - cosine**100 if cosine > 0.1 else 1.0) / STEP_DIVISOR
         # Increase the damping until the error decreases.
-        for _ in range(TRIALS):
+        for _ in range(MAX_TRIALS):
             if not error >= previous_error:
                 break
             step, d_step = solve_damped_step(normal, n, by_end, downhill, -e2 - e3, damping)
@@ -310,7 +312,7 @@ def tangent_point(
         damping /= 8.0
         # Then repeat the step at double length as long as that helps, and take the last one back.
         longer = 0.5
-        for _ in range(TRIALS):
+        for _ in range(MAX_TRIALS):
             if not error <= previous_error:
                 break
             longer *= 2.0

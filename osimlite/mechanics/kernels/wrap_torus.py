@@ -33,19 +33,19 @@ from osimlite.mechanics.laws.vectors import (
     vector,
 )
 
-LENGTH = 10_000.0
+CYLINDER_LENGTH_M = 10_000.0
 """Length of the cylinder that replaces the torus where the path touches it (m)."""
 TOLERANCE = 1e-4
 """Tolerance that OpenSim passes to MINPACK's lmdif."""
 FIRST_RADIUS = 0.2
 """Factor of the first trust region that OpenSim passes to lmdif."""
-EVALUATIONS = 500
+MAX_EVALUATIONS = 500
 """Largest number of evaluations that OpenSim passes to lmdif."""
-WORTHWHILE = 1e-4
+MIN_DECREASE_RATIO = 1e-4
 """Part of the predicted decrease that an accepted step must achieve."""
-STEP = 1e-5
+DIFFERENCE_STEP_M = 1e-5
 """Step of the forward differences in the Jacobian, m."""
-DOWN = (0.0, 0.0, -1.0)
+CYLINDER_Y = (0.0, 0.0, -1.0)
 """Direction of the y axis of the cylinder."""
 
 
@@ -90,7 +90,7 @@ def wrap_torus(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
     # The side x > 0 of the cylinder is the inside of the ring, which the path must touch.
     if (
         bend_around_cylinder(
-            a, b, p[WRAP_SURFACE.SIZES], LENGTH, 0, 1.0, p[WRAP_SURFACE.ALONE] == 1.0, e
+            a, b, p[WRAP_SURFACE.SIZES], CYLINDER_LENGTH_M, 0, 1.0, p[WRAP_SURFACE.ALONE] == 1.0, e
         )
         <= WRAPPING.NONE
     ):
@@ -115,7 +115,7 @@ def point_in_cylinder(point: Vector, outwards: Vector, ring: float) -> Vector:
     """
     away = add_scaled(point, -ring, outwards)
     inwards = times(-1.0, outwards)
-    return dot(inwards, away), dot(DOWN, away), dot(cross(inwards, DOWN), away)
+    return dot(inwards, away), dot(CYLINDER_Y, away), dot(cross(inwards, CYLINDER_Y), away)
 
 
 def point_from_cylinder(point: Vector, outwards: Vector, ring: float) -> Vector:
@@ -129,7 +129,9 @@ def point_from_cylinder(point: Vector, outwards: Vector, ring: float) -> Vector:
     x, y, z = point
     inwards = times(-1.0, outwards)
     return add_scaled(
-        add_scaled(add_scaled(times(ring, outwards), x, inwards), y, DOWN), z, cross(inwards, DOWN)
+        add_scaled(add_scaled(times(ring, outwards), x, inwards), y, CYLINDER_Y),
+        z,
+        cross(inwards, CYLINDER_Y),
     )
 
 
@@ -206,7 +208,9 @@ def minimize_residual(
     has_moved = False
     evaluations = 1
     while True:
-        slope = (compute_residual(u + STEP, start, flat_start, flat, square, ring) - value) / STEP
+        slope = (
+            compute_residual(u + DIFFERENCE_STEP_M, start, flat_start, flat, square, ring) - value
+        ) / DIFFERENCE_STEP_M
         if not abs(slope * value) > 0.0:
             return u
         # lmdif scales the unknown by the largest slope so far.
@@ -238,13 +242,13 @@ def minimize_residual(
                 damping = damping / radius_factor
             elif damping == 0.0 or ratio >= 0.75:
                 radius, damping = 2.0 * size, 0.5 * damping
-            accepted = ratio >= WORTHWHILE
+            accepted = ratio >= MIN_DECREASE_RATIO
             if accepted:
                 u += step
                 value = next_value
                 has_moved = True
             small = abs(actual) <= TOLERANCE and predicted <= TOLERANCE and ratio <= 2.0
-            if small or radius <= TOLERANCE * scale * abs(u) or evaluations >= EVALUATIONS:
+            if small or radius <= TOLERANCE * scale * abs(u) or evaluations >= MAX_EVALUATIONS:
                 return u
             if accepted:
                 break

@@ -191,7 +191,7 @@ def clear_tangents(e: Floats, code: int) -> int:
     return code
 
 
-STRAIGHT = 1e-5
+MIN_PLANE_SINE = 1e-5
 """Sine of the angle between segment and centre below which OpenSim finds no plane."""
 
 
@@ -224,7 +224,7 @@ def wrap_sphere(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, 
     chord_direction = unit(minus(first, second))
     normal = cross(chord_direction, unit(second))
     # Ends and centre on one line define no plane.
-    if norm(normal) < STRAIGHT:
+    if norm(normal) < MIN_PLANE_SINE:
         return clear_tangents(e, WRAPPING.WRAPPED)
     normal = unit(normal)
     a1, b1 = find_tangents(first, radius, normal)

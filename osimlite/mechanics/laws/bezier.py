@@ -45,9 +45,9 @@ NODES = 64
 """Number of intervals of a section with a start value of u."""
 SECTION = STARTS + 2 * (NODES + 1)
 """Length of a section."""
-ROUNDS = 20
+MAX_HALLEY_STEPS = 20
 """Largest number of steps of Halley's method."""
-NEAR = 3e-6
+STEP_TOLERANCE = 3e-6
 """Step after which the search ends, since the remaining error is below rounding."""
 
 
@@ -151,7 +151,7 @@ def _list_starts(x: Sequence[float], width: float) -> list[float]:
         low = u
         high = 1.0
         u = min(u + step, 1.0)
-        for _ in range(ROUNDS):
+        for _ in range(MAX_HALLEY_STEPS):
             # Newton's method, or bisection where it would leave the interval.
             residual = _evaluate_without_constant(x, u) - width * node / NODES
             slope = _evaluate_derivative(x, u)
@@ -161,7 +161,7 @@ def _list_starts(x: Sequence[float], width: float) -> list[float]:
             if not low <= u <= high:
                 u = 0.5 * (low + high)
             # Newton's method converges quadratically; 1e-11 is far below what the search needs.
-            if abs(u - previous_u) < NEAR * NEAR:
+            if abs(u - previous_u) < STEP_TOLERANCE * STEP_TOLERANCE:
                 break
         slope = _evaluate_derivative(x, u)
         step = width / NODES / slope if slope > 0.0 else 0.0
@@ -196,7 +196,7 @@ def curve_value(c: Sequence[float], x: float) -> tuple[float, float]:
     # Search without derivatives, then add them once by the implicit function theorem.
     plain_x = strip_derivatives(x)
     k, remainder, u = find_section(c, plain_x)
-    _, _, y, slope = search_section(c, k + X, 1, u, remainder, ROUNDS)
+    _, _, y, slope = search_section(c, k + X, 1, u, remainder, MAX_HALLEY_STEPS)
     return differentiate_root(y, slope * (plain_x - x), 1.0), slope
 
 
@@ -287,7 +287,7 @@ def take_halley_step(
     is_convergent = divisor > 0.0
     step = residual * run / (divisor if is_convergent else 1.0)
     u = min(max(u - step, 0.0), 1.0) if is_convergent else u
-    return u, is_convergent and not abs(step) < NEAR
+    return u, is_convergent and not abs(step) < STEP_TOLERANCE
 
 
 def evaluate_section(c: Sequence[float], p: int, stride: int, u: float) -> tuple[float, float]:
@@ -377,7 +377,7 @@ def solve_sum(c: Sequence[float], of_y: float, of_x: float, total: float) -> tup
         c[k + Y + 4],
         c[k + Y + 5],
     )
-    u, _, y, _ = search_section(sum_coefficients, 0, 1, u, remainder, ROUNDS)
+    u, _, y, _ = search_section(sum_coefficients, 0, 1, u, remainder, MAX_HALLEY_STEPS)
     return y, search_residual(sum_coefficients, 0, 1, u, remainder)
 
 
@@ -459,7 +459,7 @@ def curve_integral(c: Sequence[float], x: float) -> float:
     if excess <= 0.0:
         return (c[FIRST + 1] + 0.5 * c[FIRST + 2] * excess) * excess
     section, remainder, u = find_section(c, min(x, c[LAST]))
-    u, *_ = search_section(c, section + X, 1, u, remainder, ROUNDS)
+    u, *_ = search_section(c, section + X, 1, u, remainder, MAX_HALLEY_STEPS)
     for k in range(HEAD + int(c[SECTIONS]), section, SECTION):
         total += _section_integral(c, k, 1.0)
     total += _section_integral(c, section, u)

@@ -15,15 +15,15 @@ from __future__ import annotations
 from math import exp, sqrt
 from typing import NamedTuple
 
-SMALLEST = 2.220446049250313e-16
+MIN_FIBER_LENGTH_M = 2.220446049250313e-16
 """Fiber length (m) below which fibers count as parallel to the tendon."""
-UPRIGHT = 6.123233995736766e-17
+RIGHT_ANGLE_COSINE = 6.123233995736766e-17
 """Cosine of a right angle as a float, for fibers that are no longer than high."""
-NOTHING = 2e-13
+ZERO_TOLERANCE = 2e-13
 """Absolute value up to which a number counts as 0."""
-ROUNDS = 100
+MAX_TRIALS = 100
 """Largest number of lengths that are tried in the search for an equilibrium."""
-TOLERANCE = 0.01
+FORCE_TOLERANCE_N = 0.01
 """Accepted difference of the forces of fibers and tendon (N)."""
 TENDON_MODULUS = 1200.0
 """Elastic modulus of a tendon (MPa)."""
@@ -52,17 +52,21 @@ class Guess(NamedTuple):
 def cos_pennation_of_fibers(length: float, height: float) -> float:
     """Return the cosine of the pennation angle of fibers with a constant height h: sqrt(l² - h²) / l.
 
-    Fibers shorter than their height stand upright; their cosine is `UPRIGHT`, not 0, since laws
+    Fibers shorter than their height stand upright; their cosine is `RIGHT_ANGLE_COSINE`, not 0, since laws
     divide by it.
 
     Args:
         length: fiber length (m).
         height: constant height of the fibers across the tendon (m).
     """
-    if length < SMALLEST:
+    if length < MIN_FIBER_LENGTH_M:
         return 1.0
     # (l - h) (l + h) instead of l^2 - h^2 avoids cancellation for steep fibers.
-    return sqrt((length - height) * (length + height)) / length if height < length else UPRIGHT
+    return (
+        sqrt((length - height) * (length + height)) / length
+        if height < length
+        else RIGHT_ANGLE_COSINE
+    )
 
 
 def compute_schutte_activation_rate(
@@ -306,7 +310,10 @@ def make_guess(path_length: float, length: float, m: OldMuscle) -> Guess:
     if not tendon >= m.slack:
         length_along = path_length - m.slack
         tendon = m.slack
-        cos = max(length_along / sqrt(length_along * length_along + m.height * m.height), UPRIGHT)
+        cos = max(
+            length_along / sqrt(length_along * length_along + m.height * m.height),
+            RIGHT_ANGLE_COSINE,
+        )
         length = max(length_along / cos, m.height)
     return Guess(length, cos, tendon / m.slack - 1.0)
 

@@ -27,9 +27,9 @@ from osimlite.mechanics.laws.muscles import (
     first_order_activation_rate,
 )
 
-ROUNDS = 500
+MAX_NEWTON_STEPS = 500
 """Largest number of steps in the search for an equilibrium."""
-STEP = 0.75
+STEP_FRACTION = 0.75
 """Part of a Newton step that is taken, as in OpenSim."""
 
 
@@ -272,7 +272,7 @@ def millard2012_acceleration_equilibrium(
     tendon = 1.01 * m.slack
     tendon_rate = 0.0
     fiber = fiber_length_along(length - tendon, m.height, m.shortest, m.least_cos)
-    for _ in range(ROUNDS):
+    for _ in range(MAX_NEWTON_STEPS):
         if not fiber > m.height:
             break
         cos = cos_pennation(fiber, m.height, m.shortest, m.largest_sin, m.least_cos)
@@ -285,7 +285,7 @@ def millard2012_acceleration_equilibrium(
         # Also false for NaN: an undefined slope ends the search.
         if not SIGNIFICANT < abs(dynamics.slope) < inf:
             break
-        fiber = max(fiber - STEP * dynamics.acceleration / dynamics.slope, m.shortest)
+        fiber = max(fiber - STEP_FRACTION * dynamics.acceleration / dynamics.slope, m.shortest)
         tendon = length - fiber * cos_pennation(
             fiber, m.height, m.shortest, m.largest_sin, m.least_cos
         )

@@ -45,7 +45,7 @@ RIGID = 3.0
 """The velocity follows from that of the path, with a rigid tendon."""
 SLACK = 4.0
 """The velocity is 0, as a rigid tendon is slack."""
-SMALLEST = 2.0**-26
+MIN_STEP = 2.0**-26
 """Smallest part of a step, and the step (m) in the opposite direction if that fails."""
 
 
@@ -556,11 +556,11 @@ def millard2012_equilibrium_length(
             step = -fraction * direction
             # A vanishing step cannot help; OpenSim then tries a tiny step the other way.
             if not abs(step) > SIGNIFICANT:
-                step = -SMALLEST if step > 0.0 else SMALLEST if step < 0.0 else 0.0
+                step = -MIN_STEP if step > 0.0 else MIN_STEP if step < 0.0 else 0.0
                 fraction = 0.0
             fiber = max(previous_fiber + step, m.smallest)
             error, slope = force_imbalance(m, length, fiber, active, curves)
-            if fraction <= SMALLEST:
+            if fraction <= MIN_STEP:
                 break
             fraction *= 0.5
     # At the smallest length any residual is accepted, because the fibers cannot shorten further.

@@ -27,7 +27,7 @@ TENDON_SIZE = curve_size(2)
 """Length of a tendon force-length curve."""
 COMPRESSIVE_SIZE = curve_size(1)
 """Length of a compressive force curve."""
-NEAREST = 2.0**-26
+LENGTH_TOLERANCE = 2.0**-26
 """Difference up to which two lengths count as equal."""
 
 _cache_curves = lru_cache(maxsize=256)
@@ -51,7 +51,8 @@ def active_force_length(
         ValueError: there is no such curve.
     """
     _require_condition(
-        shortest >= 0.0 and min(transition - shortest, 1.0 - transition, longest - 1.0) > NEAREST,
+        shortest >= 0.0
+        and min(transition - shortest, 1.0 - transition, longest - 1.0) > LENGTH_TOLERANCE,
         "its min_norm_active_fiber_length, transition_norm_fiber_length, 1, max_norm_active_fiber_length do not rise",
     )
     _require_condition(least >= 0.0, "its minimum_value is negative")
@@ -124,7 +125,8 @@ def force_velocity(
         "its eccentric_slope_at_vmax is not from 0 to the slope near vmax",
     )
     _require_condition(
-        eccentric_near >= NEAREST, f"its eccentric_slope_near_vmax is less than {NEAREST:.2e}"
+        eccentric_near >= LENGTH_TOLERANCE,
+        f"its eccentric_slope_near_vmax is less than {LENGTH_TOLERANCE:.2e}",
     )
     _require_below(eccentric_near, eccentric_limit - 1.0, "eccentric_slope_near_vmax")
     # OpenSim places the corners near the maximum velocities at 90 % of them; each point lies on a
@@ -215,7 +217,9 @@ def tendon_force_length(
     Raises:
         ValueError: there is no such curve.
     """
-    _require_condition(one > NEAREST, f"its strain_at_one_norm_force is not above {NEAREST:.1e}")
+    _require_condition(
+        one > LENGTH_TOLERANCE, f"its strain_at_one_norm_force is not above {LENGTH_TOLERANCE:.1e}"
+    )
     stiffness, toe, curviness = _complete_properties(
         (stiffness, toe, curviness), (1.375 / one, 2.0 / 3.0, 0.5), "stiffness_at_one_norm_force"
     )

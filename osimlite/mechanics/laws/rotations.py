@@ -99,9 +99,9 @@ def rotation_from_xyz(s1: float, c1: float, s2: float, c2: float, s3: float, c3:
     )
 
 
-QUARTERS = 0.6366197723675814
+QUARTER_TURNS_PER_RAD = 0.6366197723675814
 """2 / pi, the number of quarter turns per radian."""
-LARGEST = 1e6
+MAX_ANGLE_RAD = 1e6
 """Largest angle (rad) for which the reduction of the argument is accurate enough."""
 # pi / 2 in three parts (Cody and Waite): the digits of the first two are so few that their products
 # with a number of quarter turns are exact.
@@ -115,9 +115,9 @@ def sine_cosine(angle: float) -> tuple[float, float]:
         Sine and cosine.
     """
     # Also true for NaN. Large angles are rare, and the C library reduces them with more digits.
-    if not abs(angle) < LARGEST:
+    if not abs(angle) < MAX_ANGLE_RAD:
         return sin(angle), cos(angle)
-    quarters = floor(angle * QUARTERS + 0.5)
+    quarters = floor(angle * QUARTER_TURNS_PER_RAD + 0.5)
     z = ((angle - quarters * HIGH) - quarters * MIDDLE) - quarters * LOW
     # z is between -pi/4 and pi/4; polynomials of Cephes in z^2.
     a = z * z

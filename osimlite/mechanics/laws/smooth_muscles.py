@@ -16,17 +16,17 @@ from typing import NamedTuple
 
 from osimlite.mechanics.laws.muscles import MuscleInputs
 
-SHORTEST = 0.2
+ZERO_FORCE_LENGTH = 0.2
 """Normalized fiber length at which De Groote's passive force is 0."""
 PASSIVE_SHAPE = 4.0
 """Exponent of De Groote's passive force at full strain."""
-BELOW = 0.2
+TENDON_FORCE_OFFSET = 0.2
 """Offset of the exponential of the tendon force below 0."""
 LARGEST_FORCE = 5.0
 """Upper end of the initial interval of tendon forces in the search for an equilibrium."""
-CLOSE = 1e-10
+INTERVAL_TOLERANCE = 1e-10
 """Length of the interval at which the search ends."""
-ROUNDS = 100
+MAX_BISECTIONS = 100
 """Largest number of bisections."""
 
 
@@ -131,10 +131,10 @@ def degroote_passive(length: float, strain: float) -> tuple[float, float]:
         Normalized force, and its integral over the normalized length.
     """
     # Without this offset the force of short fibers would stay positive.
-    none = exp(PASSIVE_SHAPE * (SHORTEST - 1.0) / strain)
+    none = exp(PASSIVE_SHAPE * (ZERO_FORCE_LENGTH - 1.0) / strain)
     rise = exp(PASSIVE_SHAPE * (length - 1.0) / strain) - none
     full = exp(PASSIVE_SHAPE) - none
-    return rise / full, (strain / PASSIVE_SHAPE * rise - none * (length - SHORTEST)) / full
+    return rise / full, (strain / PASSIVE_SHAPE * rise - none * (length - ZERO_FORCE_LENGTH)) / full
 
 
 def degroote_factor(velocity: float) -> float:
@@ -156,7 +156,7 @@ def degroote_velocity(factor: float) -> float:
 
 def tendon_growth(strain: float) -> float:
     """Return the exponent k of the tendon force: 0.2 (exp(k e) - 1) is 1 at the strain e."""
-    return log((1.0 + BELOW) / BELOW) / strain
+    return log((1.0 + TENDON_FORCE_OFFSET) / TENDON_FORCE_OFFSET) / strain
 
 
 def smooth_tendon_length(force: float, growth: float) -> float:
@@ -166,7 +166,11 @@ def smooth_tendon_length(force: float, growth: float) -> float:
         force: normalized tendon force.
         growth: exponent of the tendon force.
     """
-    return log((force + BELOW) / BELOW) / growth + 1.0 if force > -BELOW else nan
+    return (
+        log((force + TENDON_FORCE_OFFSET) / TENDON_FORCE_OFFSET) / growth + 1.0
+        if force > -TENDON_FORCE_OFFSET
+        else nan
+    )
 
 
 def degroote(
@@ -217,7 +221,7 @@ def degroote(
         factor = (force / cos - passive) / (a * active)
         velocity = degroote_velocity(factor)
         # Derivative of the tendon force by the normalized tendon length.
-        slope = tendon.growth * (force + BELOW)
+        slope = tendon.growth * (force + TENDON_FORCE_OFFSET)
         force_rate = (inputs.rate - velocity * fastest / cos) / m.slack * slope
     else:
         # With a rigid tendon, or a tendon force that is constant here, fibers take the rate of the
@@ -231,7 +235,11 @@ def degroote(
     if tendon.elastic:
         tension = m.strength * force
         # Integral of the tendon force over the stretch of the tendon.
-        energy += m.strength * m.slack * (force / tendon.growth - BELOW * (tendon_length - 1.0))
+        energy += (
+            m.strength
+            * m.slack
+            * (force / tendon.growth - TENDON_FORCE_OFFSET * (tendon_length - 1.0))
+        )
     activation_rate = smooth_activation_rate(inputs.excitation, a, m.rising, m.falling, m.sharpness)
     fibers = fiber_length, cos, active, factor, active_force, passive_force
     return tension, a, *fibers, activation_rate, force_rate, velocity * fastest, spring, energy
@@ -288,8 +296,8 @@ def degroote_equilibrium(
     # OpenSim requires a change of sign between both ends. The search runs in any case.
     result = at_low * degroote_residual(high, inputs, m, tendon) < 0.0
     middle = low
-    for _ in range(ROUNDS):
-        if high - low <= CLOSE:
+    for _ in range(MAX_BISECTIONS):
+        if high - low <= INTERVAL_TOLERANCE:
             break
         middle = 0.5 * (low + high)
         residual = degroote_residual(middle, inputs, m, tendon)

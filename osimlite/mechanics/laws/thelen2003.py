@@ -26,13 +26,13 @@ TOE_SHAPE = 3.0
 """Exponent of the tendon force at the end of its toe region."""
 TOE_FORCE = 0.33
 """Tendon force at the end of its toe region."""
-ROUNDS = 20
+MAX_NEWTON_STEPS = 20
 """Largest number of Newton steps in the search for an equilibrium."""
 INVERSE_ROUNDS = 100
 """Largest number of Newton steps in the search for a force at a velocity."""
-ENOUGH = 1e-6
+VELOCITY_TOLERANCE = 1e-6
 """Tolerance of the normalized velocity with a rigid tendon, as in OpenSim."""
-SMALLEST = 2.0**-26
+MIN_STEP = 2.0**-26
 """Smallest part of a step, and the step (m) in the opposite direction if that fails."""
 
 
@@ -336,7 +336,7 @@ def thelen2003_rigid(inputs: MuscleInputs, m: Thelen2003) -> float:
     cos = cos_pennation(fiber, m.height, m.shortest, m.largest_sin, m.least_cos)
     isometric, _ = active_force(fiber / m.optimal, m.width)
     factor = force_at_velocity(
-        m, inputs.rate * cos / (m.optimal * m.fastest), 1.0, isometric, ENOUGH
+        m, inputs.rate * cos / (m.optimal * m.fastest), 1.0, isometric, VELOCITY_TOLERANCE
     )
     return m.strength * isometric * factor * cos
 
@@ -384,7 +384,7 @@ def thelen2003_equilibrium(inputs: MuscleInputs, m: Thelen2003) -> tuple[bool, f
     by_velocity = find_velocity_factor(m, fibers, active, inputs.rate, stiffness)
     fiber_force, error = fiber_balance(m, fibers, active * by_velocity)
     stiffness, of_tendon = force_stiffnesses(m, fibers, active * by_velocity, fiber_force)
-    for _ in range(ROUNDS):
+    for _ in range(MAX_NEWTON_STEPS):
         if not abs(error) > equilibrium_tolerance(m):
             break
         previous_error, previous_length, fraction = error, fibers.length, 1.0
@@ -393,11 +393,11 @@ def thelen2003_equilibrium(inputs: MuscleInputs, m: Thelen2003) -> tuple[bool, f
             step = -fraction * previous_error / (stiffness - of_tendon)
             # A vanishing step cannot help; OpenSim then tries a tiny step the other way.
             if not abs(step) > SIGNIFICANT:
-                step = -SMALLEST if step > 0.0 else SMALLEST if step < 0.0 else 0.0
+                step = -MIN_STEP if step > 0.0 else MIN_STEP if step < 0.0 else 0.0
                 fraction = 0.0
             fibers = fibers_at(m, length, max(previous_length + step, m.shortest))
             fiber_force, error = fiber_balance(m, fibers, active * by_velocity)
-            if fraction <= SMALLEST:
+            if fraction <= MIN_STEP:
                 break
             fraction *= 0.5
         stiffness, of_tendon = force_stiffnesses(m, fibers, active * by_velocity, fiber_force)

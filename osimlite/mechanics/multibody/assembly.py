@@ -28,13 +28,13 @@ from osimlite.mechanics.multibody.spatial import Array
 if TYPE_CHECKING:
     from osimlite.mechanics.multibody.mechanism import Mechanism
 
-_STEPS = 100
+_MAX_STEPS = 100
 """Largest number of Newton steps."""
-_EASE = 100.0
+_UNCOUNTED_MOBILITY = 100.0
 """Factor by which coordinates that do not count move more easily."""
-_FURTHEST = 0.5
+_MAX_CHANGE = 0.5
 """Largest change of a coordinate in one step (m or rad)."""
-_FINEST = 1e-12
+_ROUNDING_ERROR = 1e-12
 """Error of a constraint that counts as rounding (m or rad)."""
 
 
@@ -170,7 +170,7 @@ def _find_nearest_pose(
     q = search.restore_pose(search.start)
     if search.assembled:
         return q
-    for _ in range(_STEPS):
+    for _ in range(_MAX_STEPS):
         if search.compute_cost(q) < search.tolerance**2:
             # No coordinate that counts has moved.
             return q
@@ -196,7 +196,7 @@ def tolerance_of(mechanism: Mechanism) -> float:
 
     OpenSim's tolerance is a tenth of the assembly accuracy.
     """
-    return max(mechanism.assembly_accuracy / 10.0, _FINEST)
+    return max(mechanism.assembly_accuracy / 10.0, _ROUNDING_ERROR)
 
 
 class _Search:
@@ -234,7 +234,7 @@ class _Search:
                         self.start[list(item.independent)]
                     )[0]
         self.ease = np.where(
-            self.assembled | (self.coordinate_weights[self.free] > 0.0), 1.0, _EASE
+            self.assembled | (self.coordinate_weights[self.free] > 0.0), 1.0, _UNCOUNTED_MOBILITY
         )
 
     def compute_cost(self, q: Array) -> float:
@@ -279,12 +279,12 @@ class _Search:
         """
         state = self._compute_state(q)
         errors = _compute_position_errors(state)
-        for _ in range(_STEPS):
+        for _ in range(_MAX_STEPS):
             step, _ = solve_with_null_space(self._compute_rows(state) * self.ease, -errors)
             step *= self.ease
             # Far from the surface the linearization is poor: take short steps, even where errors
             # grow.
-            size = min(1.0, _FURTHEST / float(np.abs(step).max(initial=_FURTHEST)))
+            size = min(1.0, _MAX_CHANGE / float(np.abs(step).max(initial=_MAX_CHANGE)))
             trial = q + size * self._spread_over_coordinates(step)
             state = self._compute_state(trial)
             new_errors = _compute_position_errors(state)

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from osimlite.mechanics.multibody.mechanism import Mechanism
 
 
-LARGEST = 1e100
+MAX_NUMBER = 1e100
 """Largest number, in SI units, in the equations of motion; the squares of larger ones overflow.
 
 The inverse of it bounds inertias from below.
@@ -202,9 +202,9 @@ def require_numbers(mechanism: Mechanism, *arrays: Array) -> None:
         arrays: arrays to check.
 
     Raises:
-        SimulationError: an entry is not finite, or larger than LARGEST.
+        SimulationError: an entry is not finite, or larger than MAX_NUMBER.
     """
-    if not all((np.abs(array) < LARGEST).all() for array in arrays):
+    if not all((np.abs(array) < MAX_NUMBER).all() for array in arrays):
         raise SimulationError(
             f"the equations of motion of '{mechanism.name}' are not finite; check the coordinate values and speeds, "
             "the applied forces, the masses and inertias of the bodies and the places of the frames"

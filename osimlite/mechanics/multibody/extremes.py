@@ -17,9 +17,9 @@ P = ParamSpec("P")
 R = TypeVar("R")
 C = TypeVar("C", bound=type)
 
-_LEAST = 1e-100
+_MIN_USUAL_SIZE = 1e-100
 """Smallest usual size of a number of a model that is not 0."""
-_MOST = 1e25
+_MAX_USUAL_SIZE = 1e25
 """Largest usual size of a number of a model; messages name numbers beyond these sizes."""
 
 
@@ -84,7 +84,13 @@ def _measure_excess(number: float) -> float:
     if not isfinite(number):
         return np.inf
     size = abs(number)
-    return size / _MOST if size > _MOST else _LEAST / size if 0.0 < size < _LEAST else 0.0
+    return (
+        size / _MAX_USUAL_SIZE
+        if size > _MAX_USUAL_SIZE
+        else _MIN_USUAL_SIZE / size
+        if 0.0 < size < _MIN_USUAL_SIZE
+        else 0.0
+    )
 
 
 def _list_numbers(component: Component) -> Iterator[tuple[str, float]]:

@@ -74,10 +74,10 @@ class Univariate(SmoothFunction):
         """
         numbers: Any = memoryview(self._numbers)
         try:
-            return evaluate_function(numbers, x) if math.isfinite(x) else _NOTHING
+            return evaluate_function(numbers, x) if math.isfinite(x) else _UNDEFINED_VALUE
         except ValueError:
             # Python's sine raises ValueError for infinite arguments, to which a factor may lead.
-            return _NOTHING
+            return _UNDEFINED_VALUE
 
     @cached_property
     def _numbers(self) -> array[float]:
@@ -146,7 +146,7 @@ def make_zero_derivatives(size: int, value: float = 0.0) -> FunctionDerivatives:
     return value, [0.0] * size, [[0.0] * size for _ in range(size)]
 
 
-_NOTHING = math.nan, math.nan, math.nan
+_UNDEFINED_VALUE = math.nan, math.nan, math.nan
 """Value and derivatives of a function where it is not defined."""
 
 

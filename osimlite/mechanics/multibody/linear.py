@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from osimlite.mechanics.kernels.linear_algebra import REDUNDANT, ROUNDING
+from osimlite.mechanics.kernels.linear_algebra import REDUNDANCY_TOLERANCE, ROUNDING
 from osimlite.mechanics.multibody.spatial import Array
 
 
@@ -49,10 +49,10 @@ def solve_with_null_space(rows: Array, values: Array) -> tuple[Array, Array]:
     if count <= size:
         basis, triangle = np.linalg.qr(rows.T, mode="complete")
         triangle = triangle[:count]
-        if np.abs(triangle.diagonal()).min() > REDUNDANT:
+        if np.abs(triangle.diagonal()).min() > REDUNDANCY_TOLERANCE:
             return basis[:, :count] @ np.linalg.solve(triangle.T, values), basis[:, count:]
     left_vectors, singular_values, right_vectors = np.linalg.svd(rows)
-    rank = int(np.sum(singular_values > REDUNDANT * max(singular_values[0], 1.0)))
+    rank = int(np.sum(singular_values > REDUNDANCY_TOLERANCE * max(singular_values[0], 1.0)))
     return right_vectors[:rank].T @ (
         left_vectors[:, :rank].T @ values / singular_values[:rank]
     ), right_vectors[rank:].T

@@ -459,7 +459,7 @@ class LinkPacker:
         self.ints += [0] * (OPERATION.SIZE * len(self.operations))
         numbers = {id(item): number for number, item in enumerate(self.operations)}
         for number, item in enumerate(self.operations):
-            freedom, law, gradient = -1, OPERATION.ALONE, 0
+            freedom, law, gradient = -1, OPERATION.SINGLE, 0
             extra = len(self.numbers)
             freedoms = [self.link_map.freedom(index) for index in item.arguments]
             drift_ints: list[int] = []
@@ -481,7 +481,7 @@ class LinkPacker:
                 self.numbers += item.radii.tolist()
             elif item.function is None:
                 freedom = freedoms[0]
-                law = OPERATION.ALONE if freedom in self.simple_freedoms else OPERATION.TOGETHER
+                law = OPERATION.SINGLE if freedom in self.simple_freedoms else OPERATION.SUMMED
             else:
                 infos = [self.link_map.mechanism.coordinates[index] for index in item.arguments]
                 table = function_table(

@@ -20,7 +20,7 @@ from osimlite.mechanics.kernels.functions import FUNCTION_TYPE
 from osimlite.mechanics.multibody.functions import Univariate
 from osimlite.mechanics.multibody.spatial import Array
 
-TOUCHING = 1e-9
+SAME_POINT_DISTANCE = 1e-9
 """Distance of points, relative to the mean distance, below which they count as one point."""
 _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 """Golden ratio of the sections of an interval."""
@@ -120,7 +120,7 @@ class SampledCurves:
         scaled_points, self._scale = _scale_to_unit_spacing(points)
         # Points that are nearly equal determine no slope between them within rounding: drop the
         # later ones.
-        is_distinct = np.diff(scaled_points, prepend=-1.0) > TOUCHING
+        is_distinct = np.diff(scaled_points, prepend=-1.0) > SAME_POINT_DISTANCE
         self._start, self._scaled_points = points[0], scaled_points[is_distinct]
         self._pieces = _compute_pieces(self._scaled_points, values[is_distinct], half_order)
 

@@ -148,7 +148,7 @@ class PairContact:
         # A response finds the record of its pair by the number of integers between them: those of
         # the pairs (two links each) and of the responses so far.
         result = []
-        back = (ITEM.OWN + 2) * len(self.pairs)
+        back = (ITEM.DETAILS + 2) * len(self.pairs)
         for pair in self.pairs:
             one = self.surfaces[pair.first]
             two = self.surfaces[pair.second]
@@ -158,9 +158,9 @@ class PairContact:
                     result.append(
                         ForceRecord(ints=ints, is_part=True, response=Response(RESPONSE, 0, 0, 1))
                     )
-                    back += ITEM.OWN + len(ints)
+                    back += ITEM.DETAILS + len(ints)
             # The next pair's record begins that much later.
-            back -= ITEM.OWN + 2
+            back -= ITEM.DETAILS + 2
         return result
 
     def pack_pair(

@@ -64,15 +64,15 @@ def _drive_from_file(
     actuators = map_actuators(builder)
     actuators |= {builder.path(item): item for item in builder.find_components(Actuator)}
     table = read_controls(find_named_file(builder.folder, str(controller.controls_file)))
-    known = {
+    driven_names = {
         word if isinstance(word, str) else builder.path(word)
         for word in controller.socket_actuators
     }
     if builder.model.document_version < LISTS_OF_PATHS:
-        known |= {item.name for item in driven_actuators}
+        driven_names |= {item.name for item in driven_actuators}
     driven_actuators = list(driven_actuators)
     for index, label in enumerate(table.columns):
-        if label in known:
+        if label in driven_names:
             continue
         if label not in actuators:
             names = [item.name for item in actuators.values()]
@@ -86,7 +86,7 @@ def _drive_from_file(
                 f"'{path}' sets '{builder.path(actuator)}' by the column '{label}' and by another entry; remove one of them",
                 file=table.file,
             )
-        known.add(label)
+        driven_names.add(label)
         driven_actuators.append(actuator)
         degree = 1 if controller.interpolation_method is None else controller.interpolation_method
         yield Drive(

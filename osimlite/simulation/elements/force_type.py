@@ -267,9 +267,11 @@ class ForceType:
         # The geometry's integers begin with the distance back to the record of its last part, a
         # path.
         if parts:
-            ints = (ITEM.OWN + len(parts[-1].ints), *ints)
+            ints = (ITEM.DETAILS + len(parts[-1].ints), *ints)
         size = len(self.record_offsets) + self.geometry.record_size(force.location)
-        tail = Tail(ITEM.OWN + self.text.int_count + len(ints), self.text.size + len(numbers), size)
+        tail = Tail(
+            ITEM.DETAILS + self.text.int_count + len(ints), self.text.size + len(numbers), size
+        )
         offsets: list[int] = []
         parameters: list[float] = []
         for term, value in zip(self.terms, force.values, strict=True):
@@ -306,7 +308,7 @@ class ForceType:
         responses = []
         if self.contact_response and not force.form:
             derivatives = Response(self.contact_response, 0, 0, 1)
-            size = ITEM.OWN + 2
+            size = ITEM.DETAILS + 2
             responses = [
                 # The first integer leads from this record to the contact behind all three.
                 ForceRecord(ints=(size * (3 - axis), axis), is_part=True, response=derivatives)

@@ -114,7 +114,7 @@ def force_elements(
 
 SKIP_ADVICE = ", or add --skip-unsupported (skip_unsupported=True) to leave them out"
 """Advice of commands with the option --skip-unsupported; commands without it remove this from the message."""
-FEW = 4
+MAX_LISTED_FORCES = 4
 """Up to this number, skipped forces are listed one by one."""
 
 
@@ -127,7 +127,7 @@ def summarize_skipped(skipped: Sequence[str]) -> list[str]:
     Returns:
         The forces one by one if they are few, else the count of each class.
     """
-    if len(skipped) <= FEW:
+    if len(skipped) <= MAX_LISTED_FORCES:
         return list(skipped)
     groups: dict[str, list[str]] = {}
     for words in skipped:

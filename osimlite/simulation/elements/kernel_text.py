@@ -353,7 +353,7 @@ class KernelText:
         return [
             "i = at(model, item)",
             "p, record = at(reals, i[ITEM.NUMBERS]), at(data, i[ITEM.RECORD])",
-            f"g, gp, work = at(i, {ITEM.OWN + self.int_count}), at(p, {self.size}), at(record, {recorded})",
+            f"g, gp, work = at(i, {ITEM.DETAILS + self.int_count}), at(p, {self.size}), at(record, {recorded})",
         ]
 
     def _compile_kernel(
@@ -429,14 +429,14 @@ class KernelText:
 
         An offset of -1 marks a state that the component lacks.
         """
-        first = ITEM.OWN + sum(term.int_count for term in self.force_type.terms)
+        first = ITEM.DETAILS + sum(term.int_count for term in self.force_type.terms)
         return {first + number: state for number, state in enumerate(self.force_type.states)}
 
     @property
     def _arguments(self) -> list[str]:
         """Arguments of the law, as expressions."""
         force_type = self.force_type
-        terms = write_arguments(force_type.terms, ITEM.OWN, 0)
+        terms = write_arguments(force_type.terms, ITEM.DETAILS, 0)
         indices = [index for index, state in self._state_indices.items() if state.is_argument]
         states = [f"(y[i[{index}]] if i[{index}] >= 0 else 0.0)" for index in indices]
         count = 1 if force_type.has_control else 0

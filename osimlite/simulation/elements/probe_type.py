@@ -33,7 +33,7 @@ from osimlite.simulation.elements.force_type import DeclaredForce
 from osimlite.simulation.elements.registry import PROBE_TYPES, kernel_name
 from osimlite.simulation.states import StateVariable
 
-HEAD = ITEM.OWN + 5
+HEAD = ITEM.DETAILS + 5
 """Offset of the integers of a probe's subjects, after its own integers."""
 
 INTEGRATE = "integrate"
@@ -122,8 +122,8 @@ class ProbeType:
             f'def {self.name}({PARAMETERS}, item: "int") -> "int":',
             "i = at(model, item)",
             "p, record = at(reals, i[ITEM.NUMBERS]), at(data, i[ITEM.RECORD])",
-            "first, total = i[ITEM.OWN + 1], p[0]",
-            "for k in range(i[ITEM.OWN]):",
+            "first, total = i[ITEM.DETAILS + 1], p[0]",
+            "for k in range(i[ITEM.DETAILS]):",
             f"    a, b = at(i, {HEAD} + {count} * k), at(p, 1 + {size} * k)",
             f"    value = law({', '.join(arguments)})",
             "    total += value",
@@ -133,8 +133,8 @@ class ProbeType:
             "    record[0] = total",
             "if first == 2:",
             "    record[1] = p[0]",
-            "for k in range(i[ITEM.OWN + 2]):",
-            "    f[i[ITEM.OWN + 3] + k] = record[k]",
+            "for k in range(i[ITEM.DETAILS + 2]):",
+            "    f[i[ITEM.DETAILS + 3] + k] = record[k]",
         ]
         return "\n    ".join([*lines, "return OUTCOME.OK"]) + "\n"
 

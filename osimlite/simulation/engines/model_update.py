@@ -162,7 +162,7 @@ class NumberUpdater:
             structure = self._engine.structure
             offset = structure[MODEL.CONTROLS]
             ints, control_numbers, _ = controls.make_record()
-            if structure[offset + ITEM.OWN :].tolist() != ints:
+            if structure[offset + ITEM.DETAILS :].tolist() != ints:
                 return None
             numbers[structure[offset + ITEM.NUMBERS] :] = control_numbers
         return numbers

@@ -26,7 +26,7 @@ from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.robot.couplings import find_line
 from osimlite.simulation.robot.robot import WORLD, Robot, RobotJoint, RobotLink, Visual
 
-_ALONG = 1e-14
+_ALIGNMENT_TOLERANCE = 1e-14
 """Largest distance of a vector from an axis, relative to the length of the vector, at which it counts as parallel."""
 
 
@@ -288,7 +288,9 @@ def _carry_back(motions: list[AxisMotion], frames: list[Array]) -> None:
     motion, last = motions[-1], frames[-1]
     turn = last[:3, :3]
     shift = last[:3, 3]
-    along = np.linalg.norm(np.cross(motion.axis, shift)) <= _ALONG * float(np.linalg.norm(shift))
+    along = np.linalg.norm(np.cross(motion.axis, shift)) <= _ALIGNMENT_TOLERANCE * float(
+        np.linalg.norm(shift)
+    )
     # A fixed offset commutes with a translation, and with a rotation about an axis through its
     # origin.
     if motion.kind == "translate" or along:

@@ -17,7 +17,7 @@ from osimlite.simulation.robot.robot import WORLD, Robot
 if TYPE_CHECKING:
     from osimlite.mechanics.multibody.mechanism import Mechanism
 
-LONGEST = 200
+MAX_NAME_LENGTH = 200
 """Largest number of characters in a name; some readers cut lines that are too long."""
 
 
@@ -32,7 +32,7 @@ def legal(name: str) -> str:
         too long.
     """
     # A name begins with a letter or an underscore.
-    word = re.sub(r"[^A-Za-z0-9_.-]", "_", name)[:LONGEST] or "_"
+    word = re.sub(r"[^A-Za-z0-9_.-]", "_", name)[:MAX_NAME_LENGTH] or "_"
     return word if word[0].isalpha() or word[0] == "_" else f"_{word}"
 
 

@@ -25,7 +25,7 @@ _Y_TO_Z = make_transform(rotation_about(np.array((1.0, 0.0, 0.0)), -np.pi / 2))
 # The cosine of a right angle rounds to 6e-17, which would be written into files.
 _Y_TO_Z[np.abs(_Y_TO_Z) < 1e-15] = 0.0
 
-GREATEST = 3e38
+MAX_SIZE_M = 3e38
 """Largest size, m: programs draw in numbers of single precision."""
 
 
@@ -210,7 +210,7 @@ class _Collector:
             path: path of the geometry.
             sizes: sizes of the shape, m.
         """
-        if all(0.0 < size < GREATEST for size in sizes):
+        if all(0.0 < size < MAX_SIZE_M for size in sizes):
             return True
         size_text = " ".join(f"{size:g}" for size in sizes)
         self.note(

@@ -71,7 +71,7 @@ MAX_EVALUATIONS = 30
 NEWTON_RANGE = 3e-3
 """Norm of the residual below which Newton's method takes over; candidates above it are dropped."""
 
-PATIENCE = 8
+MAX_STALLED_ITERATIONS = 8
 """A candidate is dropped if this many iterations have not halved the residual."""
 
 FRACTION_SCALE = 0.1
@@ -556,9 +556,9 @@ class _ClosingProblem:
         """
         self._sizes.append(float(np.linalg.norm(intermediate_result.fun)))
         present_size = self._sizes[-1]
-        earlier_size = self._sizes[-1 - PATIENCE :][0]
+        earlier_size = self._sizes[-1 - MAX_STALLED_ITERATIONS :][0]
         if present_size < NEWTON_RANGE or (
-            len(self._sizes) > PATIENCE and present_size > 0.5 * earlier_size
+            len(self._sizes) > MAX_STALLED_ITERATIONS and present_size > 0.5 * earlier_size
         ):
             raise StopIteration
 

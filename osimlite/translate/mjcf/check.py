@@ -219,14 +219,14 @@ class _MujocoModel:
         # Joints that the model does not know stay in their reference pose.
         data.qpos[:] = model.qpos0
         rates = np.zeros((len(self.free), model.nv))
-        for place, joint in self.joints.items():
-            data.qpos[model.jnt_qposadr[joint]] = q[place]
-            if place in self.free:
-                rates[self.free.index(place), model.jnt_dofadr[joint]] = 1.0
+        for index, joint in self.joints.items():
+            data.qpos[model.jnt_qposadr[joint]] = q[index]
+            if index in self.free:
+                rates[self.free.index(index), model.jnt_dofadr[joint]] = 1.0
         # Each round makes one more link of a chain of followers right.
         for _ in range(MAX_FOLLOWER_CHAIN):
             for joint, leader, polynomial in self.followers:
-                place = model.jnt_qposadr[joint]
+                address = model.jnt_qposadr[joint]
                 dof = model.jnt_dofadr[joint]
                 value = (
                     0.0
@@ -234,7 +234,7 @@ class _MujocoModel:
                     else data.qpos[model.jnt_qposadr[leader]]
                     - model.qpos0[model.jnt_qposadr[leader]]
                 )
-                data.qpos[place] = model.qpos0[place] + polyval(value, polynomial)
+                data.qpos[address] = model.qpos0[address] + polyval(value, polynomial)
                 if leader >= 0:
                     rates[:, dof] = (
                         polyval(value, polyder(polynomial)) * rates[:, model.jnt_dofadr[leader]]

@@ -27,9 +27,9 @@ from osimlite.mechanics.multibody.spatial import Array
 
 Mask = NDArray[np.bool_]
 
-TINY = 1e-15
+MIN_LENGTH_M = 1e-15
 """Smallest length that MuJoCo divides by (mjMINVAL)."""
-ROUNDING = 1e-9
+MIN_TURN_RAD = 1e-9
 """Turn (rad) below which a tendon does not turn at all, instead of by a complete revolution."""
 
 
@@ -87,7 +87,7 @@ def bend_tendon(
         else np.where(end_angle < 0.0, -1.0, 1.0)[None]
     )
     # If one end is behind the other, MuJoCo 3 with a side site winds completely around the circle.
-    min_winding = reach_p + reach_q if version < 4 and side_sites is not None else -ROUNDING
+    min_winding = reach_p + reach_q if version < 4 and side_sites is not None else -MIN_TURN_RAD
     # The angle from p to q in each direction, which is at least `min_winding`.
     winding = np.abs(signs) * (np.mod(signs * end_angle - min_winding, 2.0 * np.pi) + min_winding)
     arc = radius * (winding - reach_p - reach_q)
@@ -116,7 +116,7 @@ def bend_tendon(
     if plane_axes is None:
         lines = np.stack((norm(at_p - p), arc, norm(at_q - q)))
         # Height changes in proportion to the length in the plane, as on an unrolled cylinder.
-        slope = (second - first)[..., 2] / np.maximum(lines.sum(0), TINY)
+        slope = (second - first)[..., 2] / np.maximum(lines.sum(0), MIN_LENGTH_M)
         heights = first[..., 2] + slope * lines[0], first[..., 2] + slope * (lines[0] + lines[1])
         first_points, second_points = (
             np.concatenate((passage, z[..., None]), axis=-1)
@@ -149,7 +149,9 @@ def _choose_side(
 ) -> NDArray[np.intp]:
     """Return the way of a tendon in MuJoCo 3 with each of k side sites (k, P): 0 is straight."""
     segment = q - p
-    fraction = np.clip(-_dot(segment, p) / np.maximum(_dot(segment, segment), TINY), 0.0, 1.0)
+    fraction = np.clip(
+        -_dot(segment, p) / np.maximum(_dot(segment, segment), MIN_LENGTH_M), 0.0, 1.0
+    )
     nearest = p + fraction[..., None] * segment
     straight = (norm(nearest) > radius)[owners] & (_dot(side, nearest[owners]) >= 0.0)
     middle = unit(at_p + at_q)
@@ -173,7 +175,9 @@ def _find_passage(p: Array, q: Array, radius: Array) -> tuple[Mask, Array]:
         Whether the way is not straight (S, P), and its point on the circle (S, P, 2).
     """
     segment = q - p
-    fraction = np.clip(-_dot(segment, p) / np.maximum(_dot(segment, segment), TINY), 0.0, 1.0)
+    fraction = np.clip(
+        -_dot(segment, p) / np.maximum(_dot(segment, segment), MIN_LENGTH_M), 0.0, 1.0
+    )
     is_free = norm(p + fraction[..., None] * segment) > radius
     end_angle = _compute_angle(p, q)
     # As a function of the angle between p and q, the slope of the length changes its sign once: bisect.
@@ -183,7 +187,8 @@ def _find_passage(p: Array, q: Array, radius: Array) -> tuple[Mask, Array]:
         middle = 0.5 * (lower + upper)
         passage = _turn_on_circle(p, middle * end_angle, radius)
         slope = sum(
-            _cross(passage, passage - end) / np.maximum(norm(passage - end), TINY) for end in (p, q)
+            _cross(passage, passage - end) / np.maximum(norm(passage - end), MIN_LENGTH_M)
+            for end in (p, q)
         ) * np.sign(end_angle)
         lower = np.where(slope < 0.0, middle, lower)
         upper = np.where(slope < 0.0, upper, middle)
@@ -195,7 +200,7 @@ def _lines_cross(p: Array, p_end: Array, q: Array, q_end: Array) -> Mask:
     first_direction, second_direction, start_offset = p_end - p, q_end - q, q - p
     determinant = _cross(first_direction, second_direction)
     # Parallel lines have no intersection; comparisons with NaN are false.
-    determinant = np.where(np.abs(determinant) < TINY, np.nan, determinant)
+    determinant = np.where(np.abs(determinant) < MIN_LENGTH_M, np.nan, determinant)
     first_fraction = _cross(start_offset, second_direction) / determinant
     second_fraction = _cross(start_offset, first_direction) / determinant
     return (
@@ -211,15 +216,15 @@ def _make_plane_axes(first: Array, second: Array) -> Array:
 
     The first one points to the first end.
     """
-    first_axis = first / np.maximum(norm(first), TINY)[..., None]
+    first_axis = first / np.maximum(norm(first), MIN_LENGTH_M)[..., None]
     normal = np.cross(first, second)
     size = norm(normal)[..., None]
     # Ends on a line with the centre define no plane; any plane through the line will do.
     smallest_axis = np.where(
         np.abs(first_axis) < np.abs(first_axis).max(-1, keepdims=True), 1.0, 0.0
     )
-    normal = np.where(size > TINY, normal, np.cross(first_axis, smallest_axis))
-    normal /= np.maximum(norm(normal), TINY)[..., None]
+    normal = np.where(size > MIN_LENGTH_M, normal, np.cross(first_axis, smallest_axis))
+    normal /= np.maximum(norm(normal), MIN_LENGTH_M)[..., None]
     return np.stack((first_axis, np.cross(normal, first_axis)), axis=-2)
 
 
@@ -260,7 +265,7 @@ def _cross(a: Array, b: Array) -> Array:
 
 def _compute_tangent_angle(p: Array, radius: Array) -> Array:
     """Return the angle at the centre between a point and the tangent point of a line from it (...)."""
-    return np.arccos(np.clip(radius / np.maximum(norm(p), TINY), 0.0, 1.0))
+    return np.arccos(np.clip(radius / np.maximum(norm(p), MIN_LENGTH_M), 0.0, 1.0))
 
 
 def _turn_on_circle(p: Array, angle: Array, radius: Array) -> Array:

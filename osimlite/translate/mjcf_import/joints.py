@@ -42,7 +42,7 @@ HINGE = 3
 """MuJoCo's ``mjJNT_HINGE``."""
 SAME_ANCHOR_M = 1e-12
 """Distance up to which two hinges have the same anchor."""
-PARALLEL = 1e-4
+PARALLEL_SINE = 1e-4
 """Sine of the angle below which two axes of a CustomJoint are too near to parallel for OpenSim."""
 FREE_RANGE_M = 10.0
 """Range of coordinates that MuJoCo does not limit, in metres; it limits nothing."""
@@ -524,7 +524,7 @@ def _is_independent(model: object, joint: int, other_joints: list[int]) -> bool:
     """Return whether no other axis is parallel to that of a joint."""
     axes = model.jnt_axis  # type: ignore[attr-defined]
     return all(
-        float(np.linalg.norm(np.cross(axes[joint], axes[other_joint]))) > PARALLEL
+        float(np.linalg.norm(np.cross(axes[joint], axes[other_joint]))) > PARALLEL_SINE
         for other_joint in other_joints
     )
 

@@ -34,17 +34,17 @@ from osimlite.schema.muscle_curves import (
 )
 from osimlite.translate.mjcf.isometric import compute_mujoco_active_force
 
-POINTS = 27
+CURVE_POINTS = 27
 """Number of points in which a curve is fitted."""
 FITTED_LENGTHS = (0.4, 1.65)
 """Normalized lengths between which the active curve is fitted: fibers are hardly ever outside."""
-CLOSE = 1e-6
+FIT_TOLERANCE = 1e-6
 """Relative change of the error, or of the numbers, at which a search ends."""
 NO_CURVE = 10.0
 """Error in each point if the properties do not define a curve."""
-SEARCHES = 1
+SEARCH_COUNT = 1
 """Number of the best starting points from which a fit is searched; a second one changes little."""
-DIGITS = 6
+CACHE_DIGITS = 6
 """Digits of the parameters that the cache of fitted curves distinguishes."""
 LEAST_FVMAX = 1.001
 """Least force of lengthening fibers that a ForceVelocityCurve can have: it must be above 1."""
@@ -175,7 +175,7 @@ def fit_curves(shape: Shape, longest: float = 1.0) -> FittedCurves:
         longest: largest normalized length that occurs; the passive curve is fitted up to there.
     """
     # Rounded numbers let muscles of equal shape share a fit.
-    rounded_shape = Shape(*(round(float(value), DIGITS) for value in shape))
+    rounded_shape = Shape(*(round(float(value), CACHE_DIGITS) for value in shape))
     return FittedCurves(
         _fit_active(rounded_shape.lmin, rounded_shape.lmax),
         _fit_velocity(rounded_shape.fvmax),
@@ -183,7 +183,7 @@ def fit_curves(shape: Shape, longest: float = 1.0) -> FittedCurves:
             rounded_shape.passive_start,
             rounded_shape.passive_width,
             rounded_shape.fpmax,
-            round(math.ceil(longest / LENGTH_STEP) * LENGTH_STEP, DIGITS),
+            round(math.ceil(longest / LENGTH_STEP) * LENGTH_STEP, CACHE_DIGITS),
         ),
     )
 
@@ -194,7 +194,9 @@ def _evaluate(curve: Sequence[float], x: Array) -> Array:
 
 @lru_cache(maxsize=1024)
 def _fit_active(lmin: float, lmax: float) -> dict[str, float]:
-    x = np.linspace(max(lmin - 0.1, FITTED_LENGTHS[0]), min(lmax + 0.1, FITTED_LENGTHS[1]), POINTS)
+    x = np.linspace(
+        max(lmin - 0.1, FITTED_LENGTHS[0]), min(lmax + 0.1, FITTED_LENGTHS[1]), CURVE_POINTS
+    )
     target = Shape(lmin, lmax, 1.4).active(x)
 
     def properties(p: Array) -> dict[str, float]:
@@ -239,7 +241,7 @@ def _fit_active(lmin: float, lmax: float) -> dict[str, float]:
 @lru_cache(maxsize=1024)
 def _fit_velocity(fvmax: float) -> dict[str, float]:
     eccentric_force = max(fvmax, LEAST_FVMAX)
-    x = np.linspace(-1.05, 1.05, POINTS)
+    x = np.linspace(-1.05, 1.05, CURVE_POINTS)
     target = Shape(0.5, 1.6, eccentric_force).velocity(x)
     # The curve must be steeper at 0 than on average beyond.
     max_slope = max(2.0, 2.0 * (eccentric_force - 1.0))
@@ -281,7 +283,7 @@ def _fit_passive(start: float, width: float, fpmax: float, longest: float) -> di
     x = np.linspace(
         start - 0.1,
         max(max(length_at_unit_force, 1.0) + 0.3 * (length_at_unit_force - start), longest),
-        POINTS,
+        CURVE_POINTS,
     )
     target = Shape(0.5, 1.6, 1.4, start, width, fpmax).passive(x)
     zero_strain = start - 1.0
@@ -334,7 +336,7 @@ def _search(
             return residual(properties(p))
         # Properties that define no curve get a large error, so that the search leaves them.
         except ValueError:
-            return np.full(POINTS, NO_CURVE)
+            return np.full(CURVE_POINTS, NO_CURVE)
 
     # Starts at a bound would have no gradient.
     initial_points = [
@@ -347,12 +349,12 @@ def _search(
             start,
             bounds=(lower, upper),
             x_scale=np.ptp((lower, upper), axis=0),
-            ftol=CLOSE,
-            xtol=CLOSE,
+            ftol=FIT_TOLERANCE,
+            xtol=FIT_TOLERANCE,
         )
-        for start in initial_points[:SEARCHES]
+        for start in initial_points[:SEARCH_COUNT]
     ]
     best = min(solutions, key=lambda solution: float(solution.cost))
-    if float(best.cost) >= 0.5 * POINTS * NO_CURVE**2:
+    if float(best.cost) >= 0.5 * CURVE_POINTS * NO_CURVE**2:
         return fallback
     return properties(best.x)

@@ -17,9 +17,9 @@ MOST_ORDER = 8
 SAMPLES_PER_TERM = 4
 CLOSE_M = 1e-6
 """Error in poses that were not fitted (rms, m) at which the order is high enough."""
-SINGULAR = 1e-13
+SINGULAR_TOLERANCE = 1e-13
 """Relative size of a part of the terms that counts as zero."""
-GAIN = 0.8
+MAX_ERROR_RATIO = 0.8
 """Factor by which a higher order must reduce the error to be preferred."""
 
 
@@ -100,14 +100,14 @@ def fit_polynomial(
         size = math.comb(count + order, order)
         # Terms that depend on each other (a coordinate that does not move) end the search.
         diagonal = np.abs(np.diag(r)[:size])
-        if diagonal.min() < SINGULAR * diagonal.max() and best is not None:
+        if diagonal.min() < SINGULAR_TOLERANCE * diagonal.max() and best is not None:
             break
-        solution = np.linalg.lstsq(r[:size, :size], projected[:size], rcond=SINGULAR)[0]
+        solution = np.linalg.lstsq(r[:size, :size], projected[:size], rcond=SINGULAR_TOLERANCE)[0]
         solution = solution / scale[:size]
         errors = check_terms[:, :size] @ solution - check_lengths
         rms = float(np.sqrt(np.mean(errors**2)))
         # A higher order must be clearly better, since it swings between the samples.
-        if best is None or rms < GAIN * best[0]:
+        if best is None or rms < MAX_ERROR_RATIO * best[0]:
             best = rms, order, solution, errors
         if best[0] < CLOSE_M:
             break

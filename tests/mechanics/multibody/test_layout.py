@@ -20,7 +20,7 @@ def test_a_record_is_in_the_order_of_its_declaration():
 
 def test_fields_beside_the_offsets_are_none():
     with pytest.raises(TypeError, match="OPERATION has the fields MOTION, BEFORE, DOF, FUNCTION"):
-        OPERATION.record(ALONE=1)
+        OPERATION.record(SINGLE=1)
 
 
 @pytest.mark.parametrize("wrong", [{"LAW": 1}, {"LAW": 1, "NUMBERS": 2, "RECORD": 3, "CONTACT": 4}])

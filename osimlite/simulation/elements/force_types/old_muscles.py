@@ -8,9 +8,9 @@ from osimlite.base.named_tuples import NamedTuple
 from osimlite.mechanics.kernels.functions import evaluate_function
 from osimlite.mechanics.kernels.pointers import Floats
 from osimlite.mechanics.laws.deprecated_muscles import (
-    NOTHING,
-    ROUNDS,
-    TOLERANCE,
+    FORCE_TOLERANCE_N,
+    MAX_TRIALS,
+    ZERO_TOLERANCE,
     OldMuscle,
     compute_schutte_activation_rate,
     cos_pennation_of_fibers,
@@ -131,12 +131,12 @@ def find_isometric_length(
         return m.height
     guess = make_guess(length, start, m)
     before, error_before = guess.length, 0.0
-    for number in range(ROUNDS):
+    for number in range(MAX_TRIALS):
         active, passive, tendon = force_law(guess.length / m.optimal, guess.strain, fields, curves)
         # Fibers only pull; curves of users can be negative.
         fibers = max(activation * active, 0.0) + max(passive, 0.0)
         error = (tendon - fibers * guess.cos) * m.strength
-        if abs(error) <= TOLERANCE:
+        if abs(error) <= FORCE_TOLERANCE_N:
             break
         # The first round has no earlier error to compare with.
         if number == 0:
@@ -465,7 +465,7 @@ def compute_schutte(
     fibers = compute_fiber_forces(now, m, compute_schutte_forces, fields, curves)
     cos, active, passive, tendon = fibers
     # Fibers across the tendon carry nothing along it; OpenSim then takes the velocity of the path.
-    if cos > NOTHING:
+    if cos > ZERO_TOLERANCE:
         active_force = max(tendon / cos - passive, 0.0)
         # The velocity follows from the force that the tendon bears.
         velocity = (
@@ -474,7 +474,7 @@ def compute_schutte(
             / fields.time
         )
     else:
-        velocity = now.rate * rigid_cos(now.length, m) if abs(tendon) > NOTHING else 0.0
+        velocity = now.rate * rigid_cos(now.length, m) if abs(tendon) > ZERO_TOLERANCE else 0.0
     activation_rate = compute_schutte_activation_rate(
         now.excitation, now.activation, fields.more, fields.least, fields.time
     )

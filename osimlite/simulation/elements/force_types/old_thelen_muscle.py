@@ -2,7 +2,7 @@
 
 from osimlite.base.named_tuples import NamedTuple
 from osimlite.mechanics.laws.deprecated_muscles import (
-    NOTHING,
+    ZERO_TOLERANCE,
     OldMuscle,
     rigid_cos,
     thelen_active_force,
@@ -96,7 +96,7 @@ def compute_thelen(now: MuscleInputs, m: OldMuscle, fields: ThelenFields) -> tup
     """
     fibers = compute_fiber_forces(now, m, compute_thelen_forces, fields, ())
     cos, active, passive, tendon = fibers
-    if cos > NOTHING:
+    if cos > ZERO_TOLERANCE:
         # In this version the maximum speed depends on the activation: Vmax0 without, Vmax with full
         # activation.
         fastest = fields.slowest + min(now.activation, 1.0) * (fields.fastest - fields.slowest)
@@ -106,7 +106,7 @@ def compute_thelen(now: MuscleInputs, m: OldMuscle, fields: ThelenFields) -> tup
         )
         velocity *= fastest * m.optimal
     else:
-        velocity = now.rate / rigid_cos(now.length, m) if abs(tendon) > NOTHING else 0.0
+        velocity = now.rate / rigid_cos(now.length, m) if abs(tendon) > ZERO_TOLERANCE else 0.0
     # Thelen's first activation dynamics: two constants, and no product with the activation as in
     # later models.
     time = fields.rising if now.excitation >= now.activation else fields.falling

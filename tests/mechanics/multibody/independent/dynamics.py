@@ -8,7 +8,7 @@ from math import sqrt
 import numpy as np
 
 from osimlite.base.records import dataclass
-from osimlite.mechanics.kernels.constrained_dynamics import SAFE_MASS, SLIGHT
+from osimlite.mechanics.kernels.constrained_dynamics import INDEPENDENCE, SAFE_MASS
 from osimlite.mechanics.kernels.linear_algebra import ROUNDING
 from osimlite.mechanics.multibody.linear import solve_least_norm, solve_with_null_space
 from osimlite.mechanics.multibody.spatial import Array, skew_matrices
@@ -100,7 +100,9 @@ def acceleration(state: Moved, applied: Array) -> Array:
             weighted = np.linalg.solve(factor, binding.T).T
             # The second iteration corrects rounding errors of the first.
             for _ in range(2):
-                push = solve_least_norm(weighted, values - rows @ udot, SLIGHT * sqrt(len(rows)))
+                push = solve_least_norm(
+                    weighted, values - rows @ udot, INDEPENDENCE * sqrt(len(rows))
+                )
                 udot = udot + np.linalg.solve(factor.T, push)
             return udot
     particular, free = solve_with_null_space(rows, values)

@@ -76,7 +76,8 @@ class CoordinatePath:
         parts = [ForceRecord("pull_coordinates", is_part=True), *of_values, *of_speeds]
         # The record of the path refers to the others by the distance back to them.
         backs = [
-            sum(ITEM.OWN + len(item.ints) for item in parts[index:]) for index in range(len(parts))
+            sum(ITEM.DETAILS + len(item.ints) for item in parts[index:])
+            for index in range(len(parts))
         ]
         arms = backs[2 : 2 + len(self.arms)] or [0] * len(values)
         ints = backs[0], len(values), backs[1], backs[-1] if of_speeds else 0, *freedoms, *arms

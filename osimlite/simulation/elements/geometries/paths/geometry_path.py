@@ -19,7 +19,7 @@ from osimlite.mechanics.kernels.geodesic_paths import layout_slots
 from osimlite.mechanics.kernels.layout import ITEM
 from osimlite.mechanics.kernels.path_wraps import SURFACE_WORK
 from osimlite.mechanics.kernels.paths import NODE_TYPE, NODE_WORK, PATH_WORK
-from osimlite.mechanics.kernels.wrap_curves import MOST
+from osimlite.mechanics.kernels.wrap_curves import MAX_SEGMENTS
 from osimlite.mechanics.kernels.wrapping import ELLIPSOID_METHOD
 from osimlite.mechanics.multibody.function_tables import table_of_one
 from osimlite.mechanics.multibody.functions import SmoothFunction
@@ -158,7 +158,7 @@ class ThroughPoints:
     @property
     def corners(self) -> int:
         """Maximum number of corners of its polyline."""
-        return len(self.points) + len(self.surfaces) * (1 + int(MOST))
+        return len(self.points) + len(self.surfaces) * (1 + int(MAX_SEGMENTS))
 
     @property
     def start(self) -> tuple[int, Array]:
@@ -196,14 +196,14 @@ class ThroughPoints:
                         is_part=True,
                     )
                 )
-                wraps.append(ITEM.OWN * (behind + 2 - len(parts)))
+                wraps.append(ITEM.DETAILS * (behind + 2 - len(parts)))
             else:
                 wraps.append(0)
             wraps += surface.first, surface.last
         nodes = [(point, link_map.freedom(point.coordinate)) for point in self.points]
         # Each surface has two tangent points.
         nodes += [(surface.tangent, surface.number) for surface in self.surfaces for _ in range(2)]
-        ints = [ITEM.OWN * len(parts), len(self.points), len(self.surfaces)]
+        ints = [ITEM.DETAILS * len(parts), len(self.points), len(self.surfaces)]
         numbers = list[float]()
         for number, (node, of) in enumerate(nodes):
             # With geodesics all lines pull except chords of surfaces, because points may move in

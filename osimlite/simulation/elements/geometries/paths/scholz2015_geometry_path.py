@@ -29,7 +29,7 @@ from osimlite.mechanics.kernels.cable_surfaces import (
     surface_value,
 )
 from osimlite.mechanics.kernels.layout import ITEM
-from osimlite.mechanics.kernels.wrap_curves import MOST
+from osimlite.mechanics.kernels.wrap_curves import MAX_SEGMENTS
 from osimlite.mechanics.multibody.links import LinkMap, Placement
 from osimlite.mechanics.multibody.mechanism import GROUND, Mechanism
 from osimlite.mechanics.multibody.spatial import Array, make_offset
@@ -136,7 +136,7 @@ class Cable:
     @property
     def corners(self) -> int:
         """Maximum number of corners of its polyline."""
-        return sum(1 + int(MOST) * element.is_obstacle for element in self.elements)
+        return sum(1 + int(MAX_SEGMENTS) * element.is_obstacle for element in self.elements)
 
     @property
     def start(self) -> tuple[int, Array]:
@@ -168,7 +168,7 @@ class Cable:
             ints += int(element.is_obstacle), link, len(numbers), work
             numbers += element_numbers
             work += element.size
-        head = ITEM.OWN, len(self.elements), work
+        head = ITEM.DETAILS, len(self.elements), work
         path = ForceRecord(
             "cable_path",
             (*head, *ints),
@@ -193,7 +193,7 @@ class Cable:
             Placement(GROUND, state.transform(body)) for body in range(len(mechanism.bodies))
         ]
         _, path = self.make_records(LinkMap(mechanism, {}, placements))
-        ints = np.array([0] * ITEM.OWN + list(path.ints))
+        ints = np.array([0] * ITEM.DETAILS + list(path.ints))
         work = np.zeros(path.record_size)
         # Only cables need the engines while a model is built. As Python the search takes seconds.
         from osimlite.simulation.engines.linking import READY_CODE
