@@ -14,6 +14,7 @@ from itertools import pairwise
 import numpy as np
 
 from osimlite.base.progress import report_progress
+from osimlite.base.text import format_count
 from osimlite.errors import SettingError
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.frames import PhysicalFrame
@@ -80,11 +81,12 @@ def find_version(draft: ConversionDraft, tendons: list[Tendon], poses: SampledPo
     if not len(differences) or differences.max() <= SAME_MEANING_M:
         return draft.source.major
     worst_row = int(np.argmax(differences))
+    worst_name = draft.source.name_of("tendon", tendons[worst_row].number)
+    count = format_count(int(np.sum(differences > SAME_MEANING_M)), "tendon")
     raise SettingError(
-        f"MuJoCo 3 and 4 understand side sites of this file differently: {np.sum(differences > SAME_MEANING_M)} "
-        f"tendons have other lengths, '{draft.source.name_of('tendon', tendons[worst_row].number)}' by up to "
-        f"{differences[worst_row]:.3g} m; say which version the file was written for by --written-for 3 "
-        "(also for older ones) or --written-for 4"
+        f"MuJoCo 3 and 4 use the side sites of this file differently: the length of {count} differs, "
+        f"of '{worst_name}' by up to {differences[worst_row]:.3g} m; name the version that the file was "
+        "written for: --written-for 3 (also for older versions) or --written-for 4"
     )
 
 

@@ -108,7 +108,7 @@ def test_it_is_opensims(case):
 
 
 @pytest.mark.parametrize("half_order", [1, 2, 3])
-def test_the_residuals_have_the_variance_asked_for(half_order):
+def test_a_smoothed_curve_is_nearer_to_the_true_one_than_the_data(half_order):
     """With the variance of the noise as error variance, the spline is much closer to the true curve than the data."""
     rng = np.random.default_rng(5)
     x = np.linspace(0.0, 6.0, 200)

@@ -22,10 +22,10 @@ needs_library = pytest.mark.skipif(
 
 @needs_library
 def test_every_law_is_in_the_library():
-    assert {*LIBRARY.table["laws"]} >= {
-        *list_library_laws(),
-        *list_library_laws(DIRECTIONS),
-    } or LIBRARY.changed_files
+    if LIBRARY.changed_files:
+        pytest.skip("needs a library of these sources: 'pip install -e .' compiles it")
+    laws = {*list_library_laws(), *list_library_laws(DIRECTIONS)}
+    assert {*LIBRARY.table["laws"]} >= laws
 
 
 @needs_library

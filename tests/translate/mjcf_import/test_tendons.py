@@ -157,7 +157,14 @@ def test_the_version_is_asked_for_where_it_matters(tmp_path):
     with pytest.raises(SettingError, match=r"'t' by up to .* m; .* --written-for 3"):
         osimlite.from_mjcf(path)
     made = osimlite.from_mjcf(path, written_for=3)
-    assert "MuJoCo 3" in str(made.fidelity.to_json()) or made.fidelity.translated["/tendon/t"]
+    newer = osimlite.from_mjcf(path, written_for=4)
+    older_paths, newer_paths = (osimlite.paths(either.model) for either in (made, newer))
+    differences = [
+        abs(older_paths.lengths([q])[name] - length)
+        for q in np.linspace(-0.5, 2.5, 61)
+        for name, length in newer_paths.lengths([q]).items()
+    ]
+    assert max(differences) == pytest.approx(0.105, abs=0.01)
 
 
 @pytest.mark.parametrize("up", ["z", "y"])
