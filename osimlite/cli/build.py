@@ -75,9 +75,11 @@ def build(
     make_folder_of(target)
     write(model, target, numbers=style)
     count = sum(1 for _ in model.components())
-    warned = len(report.warnings)
+    warning_count = len(report.warnings)
     advice = (
-        f"; {format_count(warned, 'warning')}: see osimlite validate {target}" if warned else ""
+        f"; {format_count(warning_count, 'warning')}: see osimlite validate {target}"
+        if warning_count
+        else ""
     )
     say(f"{target}: {count} components{advice}")
     for path in write_companion_files(source, model, target):

@@ -126,7 +126,7 @@ def _print_table_info(file: Path, show_all: bool) -> None:
     from osimlite.lint.table import Table
 
     table = Table(read_file(file), str(file))
-    stated = {key: entry.value.text for key, entry in table.entries.items()}
+    header_values = {key: entry.value.text for key, entry in table.entries.items()}
     header = table.header
     table_type = (
         f"storage, version {header.form}" if isinstance(header, StorageHeader) else "markers"
@@ -145,7 +145,7 @@ def _print_table_info(file: Path, show_all: bool) -> None:
         rate = f", {(rows - 1) / (last - first):.4g} Hz" if last > first else ""
         facts.add("time", f"{first:g} to {last:g} s{rate}")
     unit = "Units" if table.is_markers else "inDegrees"
-    facts.add(unit, stated.get(unit, "not stated"))
+    facts.add(unit, header_values.get(unit, "not stated"))
     facts.show()
     _print_items("Markers" if table.is_markers else "Columns", table.columns, show_all)
 

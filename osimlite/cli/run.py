@@ -359,8 +359,8 @@ def _show_trials(trials: list[RunRecord]) -> None:
     show_rows(("setup", "state", "time", "result"), rows, right_aligned=(2,))
     counts = Counter(trial.status for trial in trials)
     status_text = ", ".join(f"{counts[status]} {status}" for status in STATUSES if counts[status])
-    if warned := sum(1 for trial in trials if trial.warnings):
-        status_text += f", {warned} with warnings"
+    if warning_count := sum(1 for trial in trials if trial.warnings):
+        status_text += f", {warning_count} with warnings"
     remark = (
         f" ({len(visible_trials)} shown: those that failed or whose markers are farthest off)"
         if visible_trials is not trials

@@ -42,19 +42,19 @@ def describe_fit(
         limits_text = (
             f"{100.0 * advice[0]:g} cm (root mean square) and {100.0 * advice[1]:g} cm (largest)"
         )
-        advised = (
+        advice_text = (
             ""
             if rms < advice[0] and largest < advice[1]
             else f"; {RECOMMENDS} less than {limits_text}{marker_note}"
         )
         # Errors of metres are typical of millimetres that are read as metres.
-        advised += "; check the units of the data" if rms > IMPLAUSIBLE_ERROR_M else ""
+        advice_text += "; check the units of the data" if rms > IMPLAUSIBLE_ERROR_M else ""
         yield (
             f"{format_count(result['frames'], 'frame')}, "
             f"{format_count(result['markers'], 'marker')}: "
             f"errors of {100.0 * rms:.2f} cm (root mean square), "
             f"at most {100.0 * largest:.2f} cm ({result['worst_marker']} at "
-            f"{result['worst_time']:g} s){advised}"
+            f"{result['worst_time']:g} s){advice_text}"
         )
     if "rms_orientation_error" in result:
         rms, largest = (

@@ -73,20 +73,20 @@ def separate_couplers(
         else:
             other_constraints.append(constraint)
     while pending:
-        determined = [
+        resolved_couplers = [
             constraint
             for constraint in pending
             if not dependent_coordinates & set(constraint.independent)
         ]
-        if not determined:
+        if not resolved_couplers:
             # The couplers depend on each other in a circle; move one of them to the constraints.
             rejected_coupler = pending.pop(0)
             other_constraints.append(rejected_coupler)
             dependent_coordinates.discard(rejected_coupler.dependent)
             continue
-        couplers += determined
-        dependent_coordinates -= {constraint.dependent for constraint in determined}
-        pending = [constraint for constraint in pending if constraint not in determined]
+        couplers += resolved_couplers
+        dependent_coordinates -= {constraint.dependent for constraint in resolved_couplers}
+        pending = [constraint for constraint in pending if constraint not in resolved_couplers]
     return couplers, other_constraints
 
 

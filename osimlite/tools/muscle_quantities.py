@@ -126,10 +126,10 @@ def _correct_acceleration_muscle(tables: MuscleTables, muscles: Sequence[Any]) -
         muscle.fiber_damping * muscle.max_isometric_force / muscle.optimal_fiber_length
         for muscle in muscles
     ]
-    damped = tables["FiberVelocity"] * np.array(damping)
+    damping_force = tables["FiberVelocity"] * np.array(damping)
     fiber_power = tables["MuscleActuatorPower"] - tables["TendonPower"]
     return {
-        "FiberForce": tables["FiberForce"] + damped,
+        "FiberForce": tables["FiberForce"] + damping_force,
         "FiberPassivePower": fiber_power - tables["FiberActivePower"],
     }
 

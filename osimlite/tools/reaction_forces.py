@@ -105,9 +105,9 @@ class ConstraintForces:
         torque = -(
             wrenches[bodies, :3] + np.cross(state.origins[bodies], wrenches[bodies, 3:])
         ).sum(axis=0)
-        grounded = np.concatenate((torque, force))
+        ground_wrench = np.concatenate((torque, force))
         return np.array(
-            [grounded if body == GROUND else wrenches[body] for body in constraint.bodies]
+            [ground_wrench if body == GROUND else wrenches[body] for body in constraint.bodies]
         )
 
 

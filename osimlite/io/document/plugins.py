@@ -311,7 +311,7 @@ class _Declarations:
             Annotation of the attribute, type of the property, default.
         """
         name = row["name"]
-        typed = str(row.get("type"))
+        type_name = str(row.get("type"))
         shape = row.get("kind", "single")
         if shape not in _KINDS:
             raise self.make_error(
@@ -322,16 +322,16 @@ class _Declarations:
                 str(shape),
             )
         legacy = bool(row.get("legacy"))
-        if row.get("object") or typed not in (*_SCALARS, *_VECTORS):
+        if row.get("object") or type_name not in (*_SCALARS, *_VECTORS):
             return self.parse_object_property(owner, row, shape, legacy)
         kind: FieldType
         reference = self.references.get((owner, name))
-        if typed in _VECTORS:
+        if type_name in _VECTORS:
             if shape == "list":
                 raise self.make_error(
-                    f"a list of {typed} is read by no class of OpenSim", owner, name
+                    f"a list of {type_name} is read by no class of OpenSim", owner, name
                 )
-            vector = cast("Any", typed.replace("Vector", "vector"))
+            vector = cast("Any", type_name.replace("Vector", "vector"))
             kind = Value(
                 "double", vector, row.get("unit"), legacy=legacy, optional=shape == "optional"
             )
@@ -360,9 +360,9 @@ class _Declarations:
             if not isinstance(row.get("unit") or "", str):
                 raise self.make_error(f"'unit' of '{name}' must be a text", owner, name, "unit")
             kind = Value(
-                cast("Any", typed), shape, row.get("unit"), "", min_count, max_count, legacy
+                cast("Any", type_name), shape, row.get("unit"), "", min_count, max_count, legacy
             )
-            annotation = _SCALARS[typed]
+            annotation = _SCALARS[type_name]
         if shape == "list":
             annotation = tuple[annotation, ...]
         default = row.get("default")
@@ -373,7 +373,7 @@ class _Declarations:
                 return annotation, kind, None
         text = (
             # Without a default OpenSim's types start at zero, texts empty.
-            _ZEROS.get(typed, "")
+            _ZEROS.get(type_name, "")
             if default is None and shape == "single"
             else _format_default(default)
         )
@@ -406,18 +406,18 @@ class _Declarations:
             Annotation of the attribute, type of the property, default.
         """
         name = row["name"]
-        typed = str(row.get("accepts_base") or row.get("type"))
-        accepts: Any = self.find_class(typed, owner, name, typed)
+        type_name = str(row.get("accepts_base") or row.get("type"))
+        accepts: Any = self.find_class(type_name, owner, name, type_name)
         if shape == "list":
             return list[accepts], ObjectField("list", legacy), make_empty_list()
         default = row.get("default")
         if shape == "optional" and not default:
             return accepts | None, ObjectField("optional", legacy), None
-        word = default.get("class") if isinstance(default, dict) else typed
+        word = default.get("class") if isinstance(default, dict) else type_name
         starts = self.find_class(str(word), owner, name, "default", str(word))
         if starts.abstract or not issubclass(starts, accepts):
             raise self.make_error(
-                f"the default of '{name}' must be an object: {{\"class\": ...}} of {typed}",
+                f"the default of '{name}' must be an object: {{\"class\": ...}} of {type_name}",
                 owner,
                 name,
             )

@@ -248,9 +248,9 @@ def measure_change(a: Assembly, target: Floats, q: Floats) -> float:
     """
     size = a.model[MODEL.DOFS]
     total = 0.0
-    counted = at(a.p, ASSEMBLY.HEAD + ASSEMBLY_ARRAY.COUNTED * size)
+    is_counted = at(a.p, ASSEMBLY.HEAD + ASSEMBLY_ARRAY.IS_COUNTED * size)
     for k in range(size):
-        if counted[k] > 0:
+        if is_counted[k] > 0:
             total += (q[k] - target[k]) * (q[k] - target[k])
     return 0.5 * total
 
@@ -264,12 +264,12 @@ def follow_couplers(a: Assembly, q: Floats) -> None:
     """
     size = a.model[MODEL.DOFS]
     status = at(a.p, ASSEMBLY.HEAD)
-    counted = at(status, ASSEMBLY_ARRAY.COUNTED * size)
+    is_counted = at(status, ASSEMBLY_ARRAY.IS_COUNTED * size)
     couplers = at(status, ASSEMBLY_ARRAY.COUPLER_AT * size)
     start = a.model[MODEL.CONSTRAINED]
     for k in range(a.p[ASSEMBLY.COUPLERS]):
         dependent = couplers[2 * k]
-        if status[dependent] == HOLD.FREED and counted[dependent] == 0:
+        if status[dependent] == HOLD.FREED and is_counted[dependent] == 0:
             # Evaluate again for each coupler, because its argument may depend on one before.
             evaluate_equations(a, q)
             # The error of a coupler is its function less the coordinate.
@@ -294,7 +294,7 @@ def restore_pose(a: Assembly, q: Floats, is_assembled: bool) -> bool:
     status = at(a.p, ASSEMBLY.HEAD)
     errors = at(a.w, 7 * size)
     factor = equation_factor(a)
-    counted = at(status, ASSEMBLY_ARRAY.COUNTED * size)
+    is_counted = at(status, ASSEMBLY_ARRAY.IS_COUNTED * size)
     free_list = at(status, ASSEMBLY_ARRAY.FREE * size)
     step = at(a.w, 2 * size)
     trial = at(a.w, 3 * size)
@@ -314,7 +314,7 @@ def restore_pose(a: Assembly, q: Floats, is_assembled: bool) -> bool:
         furthest = LONGEST_STEP
         for k in range(free):
             # The unknown of an eased coordinate is its change over EASE.
-            if not is_assembled and counted[free_list[k]] == 0:
+            if not is_assembled and is_counted[free_list[k]] == 0:
                 step[k] *= UNCOUNTED_MOBILITY
             furthest = max(furthest, abs(step[k]))
         # Far from a solution the linearization is poor: take short steps, even where errors grow.
@@ -348,7 +348,7 @@ def find_step(a: Assembly, target: Floats, q: Floats, has_curvature: bool) -> fl
     status = at(a.p, ASSEMBLY.HEAD)
     factor = equation_factor(a)
     step = at(a.w, size)
-    counted = at(status, ASSEMBLY_ARRAY.COUNTED * size)
+    is_counted = at(status, ASSEMBLY_ARRAY.IS_COUNTED * size)
     free_list = at(status, ASSEMBLY_ARRAY.FREE * size)
     gradient = at(a.w, 5 * size)
     null_space = at(factor, factor_size(count, size) + count * size + count * count)
@@ -361,13 +361,15 @@ def find_step(a: Assembly, target: Floats, q: Floats, has_curvature: bool) -> fl
     # The cost is half the sum of squares, so that its Hessian is the identity for the coordinates
     # that count.
     for k in range(free):
-        gradient[k] = q[free_list[k]] - target[free_list[k]] if counted[free_list[k]] > 0 else 0.0
+        gradient[k] = (
+            q[free_list[k]] - target[free_list[k]] if is_counted[free_list[k]] > 0 else 0.0
+        )
     write_null_space(free, factor, rank, null_space)
     for k in range(dimension):
         for m in range(dimension):
             total = 0.0
             for j in range(free):
-                if counted[free_list[j]] > 0:
+                if is_counted[free_list[j]] > 0:
                     total += null_space[free * k + j] * null_space[free * m + j]
             curvature[dimension * k + m] = total
     if has_curvature:

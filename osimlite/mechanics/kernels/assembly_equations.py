@@ -35,7 +35,7 @@ class ASSEMBLY_ARRAY(metaclass=Record):
 
     HOLDS = 0
     """FREED, HELD_BY_USER or HELD_AT_END of `HOLD`."""
-    COUNTED = 1
+    IS_COUNTED = 1
     """1 where a change of the coordinate adds to the cost, else 0."""
     CLAMPED = 2
     """1 where the coordinate has a range, else 0."""
@@ -174,7 +174,7 @@ def factorise_rows(a: Assembly, free: int, is_eased: bool) -> int:
     status = at(a.p, ASSEMBLY.HEAD)
     rows = equation_rows(a)
     factor = equation_factor(a)
-    counted = at(status, ASSEMBLY_ARRAY.COUNTED * size)
+    is_counted = at(status, ASSEMBLY_ARRAY.IS_COUNTED * size)
     free_list = at(status, ASSEMBLY_ARRAY.FREE * size)
     lengths = at(a.w, 7 * size + count)
     longest = 1.0
@@ -182,7 +182,7 @@ def factorise_rows(a: Assembly, free: int, is_eased: bool) -> int:
         total = 0.0
         for k in range(free):
             entry = rows[size * i + free_list[k]]
-            if is_eased and counted[free_list[k]] == 0:
+            if is_eased and is_counted[free_list[k]] == 0:
                 entry *= UNCOUNTED_MOBILITY
             factor[free * i + k] = entry
             total += entry * entry

@@ -65,7 +65,7 @@ def correct_geodesics(
     first: int,
     last: int,
     count: int,
-    rough: float,
+    kink: float,
     work: Floats,
 ) -> bool:
     """Correct all geodesics once by the least-squares solution of the linearized equations.
@@ -77,7 +77,7 @@ def correct_geodesics(
         first: number of the point before.
         last: number of the point after.
         count: number of touched obstacles.
-        rough: largest kink before the correction.
+        kink: largest kink before the correction.
         work: workspace of the search, with lines and kinks.
 
     Returns:
@@ -129,7 +129,7 @@ def correct_geodesics(
                     size,
                 )
             # Penalize changes of the length in proportion to the kinks, as Scholz et al. do.
-            a[(4 * count + number) * size + 4 * number + 3] = rough
+            a[(4 * count + number) * size + 4 * number + 3] = kink
             values[4 * count + number] = 0.0
             number += 1
             previous_obstacle = k

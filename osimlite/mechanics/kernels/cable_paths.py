@@ -156,13 +156,13 @@ def find_cable(
                 return nan
         count = draw_lines(elements, record, first, last_element, lines)
         values = at(lines, 4 * (count + 1))
-        rough = measure_kinks(elements, record, first, last_element, lines, values)
+        kink = measure_kinks(elements, record, first, last_element, lines, values)
         # NaN arises where two points coincide or a geodesic degenerates.
-        if isnan(rough):
+        if isnan(kink):
             return nan
-        if rough <= MAX_KINK_RAD or round_number == MAX_CORRECTIONS:
+        if kink <= MAX_KINK_RAD or round_number == MAX_CORRECTIONS:
             break
-        if not correct_geodesics(elements, p, record, first, last_element, count, rough, work):
+        if not correct_geodesics(elements, p, record, first, last_element, count, kink, work):
             return nan
     # Directions at the points, for the forces.
     store_vector(
@@ -450,7 +450,7 @@ def pull_cable(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
         link = element[ELEMENT.LINK]
         if element[ELEMENT.IS_OBSTACLE] == 0:
             # The station at which the cable pulls may differ from the point that it passes.
-            point = station(model, data, link, vector(numbers, CABLE_POINT.PULLED))
+            point = station(model, data, link, vector(numbers, CABLE_POINT.PULL_STATION))
             if k > 0:
                 apply_force(
                     model,

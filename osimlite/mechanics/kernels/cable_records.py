@@ -50,7 +50,7 @@ class CABLE_POINT(metaclass=Record):
 
     STATION = 0
     """Station that the cable passes (m)."""
-    PULLED = 3
+    PULL_STATION = 3
     """Station at which the cable pulls (m)."""
 
 

@@ -123,11 +123,11 @@ def solve_by_multipliers(model: Ints, data: Floats, right: Floats, work: Floats)
         scales[k] = 1.0 / sqrt(pivot)
     rows = at(data, h[CONSTRAINED.WORK_ROWS])
     drifts = at(data, h[CONSTRAINED.WORK_DRIFTS])
-    weighted = at(data, h[CONSTRAINED.WORK_FACTOR])
+    weighted_rows = at(data, h[CONSTRAINED.WORK_FACTOR])
     for i in range(count):
         # An equation of rounding errors must not be enlarged by a light degree of freedom.
         row = at(rows, size * i)
-        weighted_row = at(weighted, size * i)
+        weighted_row = at(weighted_rows, size * i)
         longest = 0.0
         for k in range(size):
             longest = max(longest, abs(row[k]))
@@ -136,7 +136,7 @@ def solve_by_multipliers(model: Ints, data: Floats, right: Floats, work: Floats)
         solve_transposed_factor(model, data, weighted_row)
         for k in range(size):
             weighted_row[k] *= scales[k]
-    factorise_by_law(model, data, count, weighted, INDEPENDENCE * sqrt(count))
+    factorise_by_law(model, data, count, weighted_rows, INDEPENDENCE * sqrt(count))
     # The second pass removes rounding errors of the first.
     for _ in range(2):
         for i in range(count):
@@ -146,7 +146,7 @@ def solve_by_multipliers(model: Ints, data: Floats, right: Floats, work: Floats)
                 missing -= row[k] * right[k]
             values[i] = missing
         # The shortest solution in the scaled unknowns is the one that constraint forces cause.
-        solve_by_law(model, count, weighted, values, spare, correction)
+        solve_by_law(model, count, weighted_rows, values, spare, correction)
         for k in range(size):
             correction[k] *= scales[k]
         solve_factor(model, data, correction)

@@ -228,10 +228,12 @@ def smooth_contact_response(
     point = add_scaled(center, 0.5 * d - geometry[9], n)
     v = minus(velocity(model, data, g[0], point), velocity(model, data, g[1], point))
     constants = SmoothContact(geometry[9], p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8])
-    pressed, damped, dragged, growth = smooth_contact_derivatives(constants, d, n, v)
+    force_by_depth, force_by_approach, friction_by_slip, growth = smooth_contact_derivatives(
+        constants, d, n, v
+    )
     if growth != 0.0:
         touching = ContactState(g[0], g[1], point, center, n, v, 0.5)
-        changes = pressed, damped, dragged
+        changes = force_by_depth, force_by_approach, friction_by_slip
         write_response(model, data, y, f, touching, i[ITEM.DETAILS + 1], changes, growth)
     return OUTCOME.OK
 
@@ -277,7 +279,7 @@ def write_response(
         changes: derivatives of the normal force by depth and approach, and friction over slip.
         growth: relative derivative of the force by the depth (1/m).
     """
-    change, (pressed, damped, dragged) = at(data, WORK.SCRATCH), changes
+    change, (force_by_depth, force_by_approach, friction_by_slip) = at(data, WORK.SCRATCH), changes
     first_link = contact.one
     second_link = contact.two
     point = contact.point
@@ -293,10 +295,10 @@ def write_response(
         if axis > 1:
             load_direction = cross(n, load_direction)
         # Friction resists slip like a damper, whose constant grows with the depth.
-        change[1], by_depth = -dragged, -growth * dragged * dot(v, load_direction)
+        change[1], by_depth = -friction_by_slip, -growth * friction_by_slip * dot(v, load_direction)
     else:
         # Depth and approach increase the force, so that it resists both.
-        change[0], change[1] = -pressed, -damped
+        change[0], change[1] = -force_by_depth, -force_by_approach
     apply_force(model, data, second_link, point, load_direction)
     apply_force(model, data, first_link, point, times(-1.0, load_direction))
     factors = PointFactors(times(by_depth, n), times(change[1], load_direction))

@@ -140,25 +140,28 @@ def begin_criteria(sensor_plan: Ints, i: Ints, row: Floats, work: Floats) -> Non
     """
     for number in range(i[0]):
         criterion = at(i, 1 + CRITERION.SIZE * number)
-        noted = at(work, criterion[CRITERION.WORKSPACE])
+        criterion_work = at(work, criterion[CRITERION.WORKSPACE])
         centre = sensor_plan[SENSOR_PLAN.CENTRE]
         if criterion[CRITERION.KIND] == CRITERION_TYPE.GAIT:
-            noted[GAIT_WORK.BEFORE] = noted[GAIT_WORK.HERE] = compute_walked_distance(
-                sensor_plan, row
+            criterion_work[GAIT_WORK.BEFORE] = criterion_work[GAIT_WORK.HERE] = (
+                compute_walked_distance(sensor_plan, row)
             )
-            noted[GAIT_WORK.HEIGHT] = row[centre + 1]
-            noted[GAIT_WORK.FALLEN] = noted[GAIT_WORK.COUNT] = 0.0
+            criterion_work[GAIT_WORK.HEIGHT] = row[centre + 1]
+            criterion_work[GAIT_WORK.FALLEN] = criterion_work[GAIT_WORK.COUNT] = 0.0
             # Unknown contact, so that a foot that stands from the start does not count as one that
             # lands.
-            noted[GAIT_WORK.TOUCHES] = noted[GAIT_WORK.TOUCHES + 1] = -1.0
+            criterion_work[GAIT_WORK.TOUCHES] = criterion_work[GAIT_WORK.TOUCHES + 1] = -1.0
         elif criterion[CRITERION.KIND] == CRITERION_TYPE.JUMP:
             for k in range(JUMP_WORK.ENDED):
-                noted[k] = row[centre + 1]
-            noted[JUMP_WORK.ENDED], noted[JUMP_WORK.PHASE] = 0.0, JUMP_PHASE.PREPARES
+                criterion_work[k] = row[centre + 1]
+            criterion_work[JUMP_WORK.ENDED], criterion_work[JUMP_WORK.PHASE] = (
+                0.0,
+                JUMP_PHASE.PREPARES,
+            )
         else:
             for k in range(SAMPLE_WORK.SIZE):
-                noted[k] = 0.0
-            noted[SAMPLE_WORK.START] = noted[SAMPLE_WORK.HERE] = row[centre]
+                criterion_work[k] = 0.0
+            criterion_work[SAMPLE_WORK.START] = criterion_work[SAMPLE_WORK.HERE] = row[centre]
 
 
 def update_criteria(
@@ -190,17 +193,17 @@ def update_criteria(
     for number in range(i[0]):
         criterion = at(i, 1 + CRITERION.SIZE * number)
         numbers = at(p, criterion[CRITERION.NUMBERS])
-        noted = at(work, criterion[CRITERION.WORKSPACE])
+        criterion_work = at(work, criterion[CRITERION.WORKSPACE])
         # SCONE's measures see only what happens within their times.
         if not numbers[CRITERION_NUMBERS.START] <= t < numbers[CRITERION_NUMBERS.STOP]:
             continue
         if criterion[CRITERION.KIND] == CRITERION_TYPE.GAIT:
-            note_gait(sensor_plan, numbers, t, row, noted)
-            has_fallen = has_fallen or noted[GAIT_WORK.FALLEN] > 0.0
+            note_gait(sensor_plan, numbers, t, row, criterion_work)
+            has_fallen = has_fallen or criterion_work[GAIT_WORK.FALLEN] > 0.0
             continue
         if criterion[CRITERION.KIND] == CRITERION_TYPE.JUMP:
-            note_jump(sensor_plan, numbers, t, row, noted)
-            has_fallen = has_fallen or noted[JUMP_WORK.ENDED] > 0.0
+            note_jump(sensor_plan, numbers, t, row, criterion_work)
+            has_fallen = has_fallen or criterion_work[JUMP_WORK.ENDED] > 0.0
             continue
         if criterion[CRITERION.KIND] == CRITERION_TYPE.WANG:
             value = metabolic_power(sensor_plan, sensor_numbers, numbers, row, u)
@@ -216,29 +219,33 @@ def update_criteria(
             value = range_penalty(
                 sensor_plan, criterion[CRITERION.KIND], criterion[CRITERION.INDEX], numbers, row
             )
-        noted[SAMPLE_WORK.HERE] = row[sensor_plan[SENSOR_PLAN.CENTRE]]
-        add_sample(noted, t, value)
+        criterion_work[SAMPLE_WORK.HERE] = row[sensor_plan[SENSOR_PLAN.CENTRE]]
+        add_sample(criterion_work, t, value)
     return has_fallen
 
 
-def add_sample(noted: Floats, t: float, value: float) -> None:
+def add_sample(criterion_work: Floats, t: float, value: float) -> None:
     """Add a sample of a value to its integral by the trapezoidal rule, and to its extremes.
 
     Args:
-        noted: workspace of the criterion, see `SAMPLE_WORK`.
+        criterion_work: workspace of the criterion, see `SAMPLE_WORK`.
         t: time (s).
         value: value.
     """
-    if noted[SAMPLE_WORK.BEGUN] > 0.0:
-        dt = t - noted[SAMPLE_WORK.TIME]
-        noted[SAMPLE_WORK.TOTAL] += 0.5 * dt * (noted[SAMPLE_WORK.VALUE] + value)
-        noted[SAMPLE_WORK.SPAN] += dt
+    if criterion_work[SAMPLE_WORK.BEGUN] > 0.0:
+        dt = t - criterion_work[SAMPLE_WORK.TIME]
+        criterion_work[SAMPLE_WORK.TOTAL] += 0.5 * dt * (criterion_work[SAMPLE_WORK.VALUE] + value)
+        criterion_work[SAMPLE_WORK.SPAN] += dt
         # The first sample sets the extremes: its value may be negative.
-        noted[SAMPLE_WORK.HIGHEST] = max(noted[SAMPLE_WORK.HIGHEST], value)
-        noted[SAMPLE_WORK.LOWEST] = min(noted[SAMPLE_WORK.LOWEST], value)
+        criterion_work[SAMPLE_WORK.HIGHEST] = max(criterion_work[SAMPLE_WORK.HIGHEST], value)
+        criterion_work[SAMPLE_WORK.LOWEST] = min(criterion_work[SAMPLE_WORK.LOWEST], value)
     else:
-        noted[SAMPLE_WORK.HIGHEST] = noted[SAMPLE_WORK.LOWEST] = value
-    noted[SAMPLE_WORK.BEGUN], noted[SAMPLE_WORK.TIME], noted[SAMPLE_WORK.VALUE] = 1.0, t, value
+        criterion_work[SAMPLE_WORK.HIGHEST] = criterion_work[SAMPLE_WORK.LOWEST] = value
+    (
+        criterion_work[SAMPLE_WORK.BEGUN],
+        criterion_work[SAMPLE_WORK.TIME],
+        criterion_work[SAMPLE_WORK.VALUE],
+    ) = 1.0, t, value
 
 
 def compute_walked_distance(sensor_plan: Ints, row: Floats) -> float:
@@ -259,7 +266,9 @@ def compute_walked_distance(sensor_plan: Ints, row: Floats) -> float:
     return 0.5 * (centre + min(first_foot, second_foot))
 
 
-def note_gait(sensor_plan: Ints, numbers: Floats, t: float, row: Floats, noted: Floats) -> None:
+def note_gait(
+    sensor_plan: Ints, numbers: Floats, t: float, row: Floats, criterion_work: Floats
+) -> None:
     """Update a gait: detect a fall and steps.
 
     A fall is a mass centre below a part of its height at the start. A step is a foot that lands,
@@ -270,14 +279,14 @@ def note_gait(sensor_plan: Ints, numbers: Floats, t: float, row: Floats, noted: 
         numbers: numbers of the criterion.
         t: time (s).
         row: sensor row.
-        noted: workspace of the criterion, see `GAIT_WORK`.
+        criterion_work: workspace of the criterion, see `GAIT_WORK`.
     """
-    noted[GAIT_WORK.HERE] = compute_walked_distance(sensor_plan, row)
+    criterion_work[GAIT_WORK.HERE] = compute_walked_distance(sensor_plan, row)
     if (
         row[sensor_plan[SENSOR_PLAN.CENTRE] + 1]
-        < numbers[CRITERION_NUMBERS.HEIGHT] * noted[GAIT_WORK.HEIGHT]
+        < numbers[CRITERION_NUMBERS.HEIGHT] * criterion_work[GAIT_WORK.HEIGHT]
     ):
-        noted[GAIT_WORK.FALLEN] = 1.0
+        criterion_work[GAIT_WORK.FALLEN] = 1.0
     has_touched = False
     for leg in range(2):
         touches = (
@@ -285,23 +294,27 @@ def note_gait(sensor_plan: Ints, numbers: Floats, t: float, row: Floats, noted: 
             if row[sensor_plan[SENSOR_PLAN.LOADS] + leg] >= numbers[CRITERION_NUMBERS.LOAD]
             else 0.0
         )
-        has_touched = has_touched or (touches > 0.0 and noted[GAIT_WORK.TOUCHES + leg] == 0.0)
-        noted[GAIT_WORK.TOUCHES + leg] = touches
-    count = int(noted[GAIT_WORK.COUNT])
+        has_touched = has_touched or (
+            touches > 0.0 and criterion_work[GAIT_WORK.TOUCHES + leg] == 0.0
+        )
+        criterion_work[GAIT_WORK.TOUCHES + leg] = touches
+    count = int(criterion_work[GAIT_WORK.COUNT])
     # A step takes two numbers, its time and its length; the first one starts at time 0.
-    last_step_time = noted[GAIT_WORK.STEPS + 2 * (count - 1)] if count > 0 else 0.0
+    last_step_time = criterion_work[GAIT_WORK.STEPS + 2 * (count - 1)] if count > 0 else 0.0
     if (
         has_touched
-        and noted[GAIT_WORK.FALLEN] == 0.0
+        and criterion_work[GAIT_WORK.FALLEN] == 0.0
         and t - last_step_time > numbers[CRITERION_NUMBERS.SHORTEST]
     ):
-        step = at(noted, GAIT_WORK.STEPS + 2 * count)
-        step[0], step[1] = t, noted[GAIT_WORK.HERE] - noted[GAIT_WORK.BEFORE]
-        noted[GAIT_WORK.BEFORE] = noted[GAIT_WORK.HERE]
-        noted[GAIT_WORK.COUNT] += 1.0
+        step = at(criterion_work, GAIT_WORK.STEPS + 2 * count)
+        step[0], step[1] = t, criterion_work[GAIT_WORK.HERE] - criterion_work[GAIT_WORK.BEFORE]
+        criterion_work[GAIT_WORK.BEFORE] = criterion_work[GAIT_WORK.HERE]
+        criterion_work[GAIT_WORK.COUNT] += 1.0
 
 
-def note_jump(sensor_plan: Ints, numbers: Floats, t: float, row: Floats, noted: Floats) -> None:
+def note_jump(
+    sensor_plan: Ints, numbers: Floats, t: float, row: Floats, criterion_work: Floats
+) -> None:
     """Update a jump: follow the height of the mass centre and the phase.
 
     The jumper takes off once it rises after its time to prepare, and comes down when it sinks, or when
@@ -312,22 +325,28 @@ def note_jump(sensor_plan: Ints, numbers: Floats, t: float, row: Floats, noted: 
         numbers: numbers of the criterion.
         t: time (s).
         row: sensor row.
-        noted: workspace of the criterion, see `JUMP_WORK`.
+        criterion_work: workspace of the criterion, see `JUMP_WORK`.
     """
     height = row[sensor_plan[SENSOR_PLAN.CENTRE] + 1]
     rise = row[sensor_plan[SENSOR_PLAN.RISE]]
-    phase = noted[JUMP_WORK.PHASE]
+    phase = criterion_work[JUMP_WORK.PHASE]
     has_load = row[sensor_plan[SENSOR_PLAN.LOADS]] + row[sensor_plan[SENSOR_PLAN.LOADS] + 1] > 0.0
-    noted[JUMP_WORK.HERE], noted[JUMP_WORK.PEAK] = height, max(noted[JUMP_WORK.PEAK], height)
-    if height < numbers[CRITERION_NUMBERS.HEIGHT] * noted[JUMP_WORK.START]:
-        noted[JUMP_WORK.ENDED] = 1.0
+    criterion_work[JUMP_WORK.HERE], criterion_work[JUMP_WORK.PEAK] = (
+        height,
+        max(criterion_work[JUMP_WORK.PEAK], height),
+    )
+    if height < numbers[CRITERION_NUMBERS.HEIGHT] * criterion_work[JUMP_WORK.START]:
+        criterion_work[JUMP_WORK.ENDED] = 1.0
     elif phase == JUMP_PHASE.PREPARES:
         if t >= numbers[CRITERION_NUMBERS.PREPARE] and (rise > 0.0 or not has_load):
-            noted[JUMP_WORK.PHASE], noted[JUMP_WORK.PREPARED] = JUMP_PHASE.TAKES_OFF, height
+            criterion_work[JUMP_WORK.PHASE], criterion_work[JUMP_WORK.PREPARED] = (
+                JUMP_PHASE.TAKES_OFF,
+                height,
+            )
     elif phase == JUMP_PHASE.TAKES_OFF and not has_load:
-        noted[JUMP_WORK.PHASE] = JUMP_PHASE.FLIES
+        criterion_work[JUMP_WORK.PHASE] = JUMP_PHASE.FLIES
     elif phase < JUMP_PHASE.COMES_DOWN and (rise < 0.0 or (phase == JUMP_PHASE.FLIES and has_load)):
-        noted[JUMP_WORK.PHASE], noted[JUMP_WORK.ENDED] = (
+        criterion_work[JUMP_WORK.PHASE], criterion_work[JUMP_WORK.ENDED] = (
             JUMP_PHASE.COMES_DOWN,
             numbers[CRITERION_NUMBERS.AT_PEAK],
         )

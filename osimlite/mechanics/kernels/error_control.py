@@ -79,7 +79,9 @@ def error_weight(value: float) -> float:
     return 1.0 / abs(value) if abs(value) > 1.0 else 1.0
 
 
-def next_step_size(h: float, error: float, accuracy: float, cut: bool, order: float) -> float:
+def next_step_size(
+    h: float, error: float, accuracy: float, is_shortened: bool, order: float
+) -> float:
     """Return the step to try after a step of size h, as Simbody chooses it.
 
     It is less than h if error > accuracy.
@@ -93,7 +95,7 @@ def next_step_size(h: float, error: float, accuracy: float, cut: bool, order: fl
         error: norm of the estimated error of this step; infinite or not a number after a failed
             evaluation.
         accuracy: accepted error norm.
-        cut: whether the step was shortened by a limit, so that it cannot justify a longer one.
+        is_shortened: whether the step was shortened by a limit, so that it cannot justify a longer one.
         order: order of the error.
     """
     # A step that failed says nothing about the error: reduce it tenfold.
@@ -104,7 +106,7 @@ def next_step_size(h: float, error: float, accuracy: float, cut: bool, order: fl
         return max(min(proposed_step, 0.9 * h), 0.1 * h)
     proposed_step = 0.9 * h * (accuracy / error) ** (1.0 / order) if error > 0.0 else inf
     # Keep the step unless it may grow by a fifth, as changes cost implicit methods a factorization.
-    return h if cut or proposed_step < 1.2 * h else min(proposed_step, 5.0 * h)
+    return h if is_shortened or proposed_step < 1.2 * h else min(proposed_step, 5.0 * h)
 
 
 def step_end(h: Floats) -> float:
@@ -130,9 +132,9 @@ def judge_step(h: Floats, t1: float, error: float, order: float) -> None:
     step = h[METHOD_WORK.NEXT_STEP]
     accuracy = h[METHOD_WORK.ACCEPTED]
     # A step that was cut much shorter is no basis for the size of the next one.
-    cut = limit < h[METHOD_WORK.REACHED] + 0.95 * step
+    is_shortened = limit < h[METHOD_WORK.REACHED] + 0.95 * step
     h[METHOD_WORK.NEXT_STEP] = min(
-        max(next_step_size(step, error, accuracy, cut, order), h[METHOD_WORK.SHORTEST]),
+        max(next_step_size(step, error, accuracy, is_shortened, order), h[METHOD_WORK.SHORTEST]),
         h[METHOD_WORK.LONGEST],
     )
     # As in Simbody, the shortest allowed step is accepted whatever its error.
@@ -243,11 +245,11 @@ def error_norm(model: Ints, y0: Floats, errors: Floats, h: Floats, is_strict: in
     for k in range(n):
         of_q += errors[k] * errors[k]
     for k in range(n, 2 * n):
-        weighted = error_weight(y0[k]) * errors[k]
-        of_u += weighted * weighted
+        weighted_error = error_weight(y0[k]) * errors[k]
+        of_u += weighted_error * weighted_error
     for k in range(2 * n, size):
-        weighted = error_weight(y0[k]) * errors[k]
-        square = weighted * weighted
+        weighted_error = error_weight(y0[k]) * errors[k]
+        square = weighted_error * weighted_error
         of_z = max(of_z, square) if is_strict else of_z + square
     of_q /= max(h[METHOD_WORK.COUNTED_Q], 1.0)
     of_u /= max(h[METHOD_WORK.COUNTED_U], 1.0)

@@ -146,7 +146,7 @@ def lay_chain(
         p,
         first,
         second,
-        BENDING.PULLED if stage == SEARCH_STAGE.STRING else pose[SURFACE_POSE.HOW],
+        BENDING.STRING if stage == SEARCH_STAGE.STRING else pose[SURFACE_POSE.HOW],
         about,
         work,
     )

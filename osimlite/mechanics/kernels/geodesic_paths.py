@@ -250,23 +250,27 @@ def bend_segment(i: Ints, p: Floats, record: Floats, first_node: int, second_nod
             near_count += 1
     store_vector(chain, 0, vector(work, NODE_WORK.SIZE * first_node + NODE_WORK.POSITION))
     # `combination` counts combinations of directions past open surfaces, as digits of a mixed radix.
-    best_count, least, combination, stage = 0, inf, 0, SEARCH_STAGE.ACTIVE_SIDE
+    best_count, shortest_length, combination, stage = 0, inf, 0, SEARCH_STAGE.ACTIVE_SIDE
     while combination < MAX_COMBINATIONS and near_count > 0:
         store_vector(
             chain, SLOT.SIZE, vector(work, NODE_WORK.SIZE * second_node + NODE_WORK.POSITION)
         )
         count, step = fill_slots(
-            i, p, record, first_node, second_node, near_count, combination, stage, least
+            i, p, record, first_node, second_node, near_count, combination, stage, shortest_length
         )
         length = chain_length(chain, count) if count >= 0 else inf
-        if length < least:
-            best_count, least = count, length
+        if length < shortest_length:
+            best_count, shortest_length = count, length
             for k in range(SLOT.SIZE * (count + 1)):
                 best[k] = chain[k]
         combination += step
         # On an ellipsoid there may be no geodesic near the start, but a shortest one exists; where
         # surfaces intersect, no smooth path may exist, and one surface alone must do.
-        if combination == MAX_COMBINATIONS and least == inf and stage < SEARCH_STAGE.ALONE:
+        if (
+            combination == MAX_COMBINATIONS
+            and shortest_length == inf
+            and stage < SEARCH_STAGE.ALONE
+        ):
             combination = 0
             stage += 1
     return best_count
@@ -281,7 +285,7 @@ def fill_slots(
     near_count: int,
     combination: int,
     stage: int,
-    least: float,
+    shortest_length: float,
 ) -> tuple[int, int]:
     """Fill the slots with the surfaces that bend the segment between two points.
 
@@ -294,7 +298,7 @@ def fill_slots(
         near_count: number of surfaces that may bend the segment.
         combination: number of the combination of directions.
         stage: ACTIVE_SIDE, STRING or ALONE of `SEARCH_STAGE`.
-        least: length of the shortest path so far (m).
+        shortest_length: length of the shortest path so far (m).
 
     Returns:
         The number of surfaces, -1 if there is no such path that is shorter; and the increment to the
@@ -313,7 +317,7 @@ def fill_slots(
         store_vector(poses, SURFACE_POSE.SIZE * number + SURFACE_POSE.ABOUT, (0.0, 0.0, 0.0))
     # A surface that is passed in another direction needs the others in place before the chain is
     # smoothed.
-    waits = False
+    needs_others = False
     for _ in range(MAX_CHANGES):
         previous_count = count
         # A geodesic that has shrunk to nothing does not touch.
@@ -326,9 +330,11 @@ def fill_slots(
             number, slot_index, axis = find_largest_turn(
                 i, p, wraps, poses, first_node, chain, count, search_work
             )
-            if (slot_index == 0 and not waits) or (count > 0 and stage == SEARCH_STAGE.ALONE):
+            if (slot_index == 0 and not needs_others) or (
+                count > 0 and stage == SEARCH_STAGE.ALONE
+            ):
                 return count, step
-            waits = False
+            needs_others = False
             if slot_index > 0:
                 numbers = at(p, wraps[GEODESIC_WRAP.SIZE * number + GEODESIC_WRAP.NUMBERS])
                 pose = at(poses, SURFACE_POSE.SIZE * number)
@@ -358,18 +364,18 @@ def fill_slots(
                         )
                         # In other directions than the first, wait for further surfaces: alone, the
                         # segment might slide back.
-                        waits = which > 0 and stage < SEARCH_STAGE.ALONE
+                        needs_others = which > 0 and stage < SEARCH_STAGE.ALONE
                 insert_slot(numbers, pose, chain, count, slot_index, number)
                 if not lay_chain(numbers, pose, chain, count + 1, slot_index, stage, search_work):
                     remove_slot(chain, count + 1, slot_index)
                     continue
                 count += 1
-                if waits:
+                if needs_others:
                     continue
         elif count == 0:
             break
         # A chain that is clearly longer than the best one need not be smoothed.
-        if MAX_LENGTH_RATIO * chain_length(chain, count) > least or not smooth_chain(
+        if MAX_LENGTH_RATIO * chain_length(chain, count) > shortest_length or not smooth_chain(
             chain, count, search_work
         ):
             break

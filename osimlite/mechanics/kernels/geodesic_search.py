@@ -135,21 +135,21 @@ def smooth_chain(chain: Floats, count: int, work: Floats) -> bool:
     values = at(work, GEODESIC_WORK_SIZE)
     corrections = at(values, 2 * size)
     a = at(corrections, size)
-    previous_kink, stiff = inf, 0.0
+    previous_kink, stiffness = inf, 0.0
     for _ in range(MAX_ROUNDS):
-        rough = fill_equations(chain, count, values, a, stiff)
-        if rough <= MAX_KINK_RAD or previous_kink <= rough < MAX_STALLED_KINK_RAD:
+        kink = fill_equations(chain, count, values, a, stiffness)
+        if kink <= MAX_KINK_RAD or previous_kink <= kink < MAX_STALLED_KINK_RAD:
             return True
-        previous_kink = rough
+        previous_kink = kink
         rank = factorise_equations(size, size, a, 0.0)
         # A negative determinant marks a saddle of the length: stiffen the springs and try again
         # from here.
         if determinant_sign(size, a) < 0.0:
-            stiff = max(STIFFNESS_RATIO * stiff, MIN_STIFFNESS)
+            stiffness = max(STIFFNESS_RATIO * stiffness, MIN_STIFFNESS)
             continue
         solve_minimum_norm(size, size, a, rank, values, at(values, size), corrections)
         # Near a minimum the springs only slow down convergence; release them step by step.
-        stiff = stiff / STIFFNESS_RATIO if stiff > MIN_STIFFNESS else 0.0
+        stiffness = stiffness / STIFFNESS_RATIO if stiffness > MIN_STIFFNESS else 0.0
         step = 1.0
         for k in range(count):
             step = min(
@@ -226,7 +226,7 @@ def determinant_sign(size: int, a: Floats) -> float:
     return sign
 
 
-def fill_equations(chain: Floats, count: int, values: Floats, a: Floats, stiff: float) -> float:
+def fill_equations(chain: Floats, count: int, values: Floats, a: Floats, stiffness: float) -> float:
     """Fill left sides (4 n, 4 n) and right sides of the equations.
 
     Args:
@@ -234,7 +234,7 @@ def fill_equations(chain: Floats, count: int, values: Floats, a: Floats, stiff: 
         count: number n of geodesics.
         values: filled with the right sides.
         a: filled with the left sides.
-        stiff: stiffness of the springs (N/m).
+        stiffness: stiffness of the springs (N/m).
 
     Returns:
         The largest kink (rad).
@@ -271,7 +271,7 @@ def fill_equations(chain: Floats, count: int, values: Floats, a: Floats, stiff: 
                     # A spring at each end adds to the derivative by its displacement; it does not
                     # change the right side.
                     end,
-                    times(sign * (1.0 + stiff * distance), axis),
+                    times(sign * (1.0 + stiffness * distance), axis),
                     cross(axis, line),
                     at(a, size * row + UNKNOWNS * (k - 1)),
                 )

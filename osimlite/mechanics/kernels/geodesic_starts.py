@@ -80,7 +80,7 @@ class BENDING(metaclass=Record):
     """A surface bends a segment on its active side."""
     ANY_SIDE = 2.0
     """A surface bends a segment on any side where the segment passes through it."""
-    PULLED = 3.0
+    STRING = 3.0
     """An ellipsoid bends a segment where a tightened string comes to lie."""
 
 
@@ -103,7 +103,7 @@ def start_on_surface(
         p: numbers of the wrap.
         first: start of the segment.
         second: end of the segment.
-        bending: ACTIVE_SIDE, ANY_SIDE or PULLED of `BENDING`.
+        bending: ACTIVE_SIDE, ANY_SIDE or STRING of `BENDING`.
         about: axis about which the segment turns around a surface without a side, by the right-hand
             rule; zeros for either direction.
         work: workspace of a string.
@@ -264,7 +264,7 @@ def start_on_ellipsoid(
         second: end of the segment.
         axis: axis of the active side.
         side: sign of the active side, 0.0 for the complete surface.
-        bending: ACTIVE_SIDE, ANY_SIDE or PULLED of `BENDING`.
+        bending: ACTIVE_SIDE, ANY_SIDE or STRING of `BENDING`.
         about: axis about which the segment turns, zeros for either direction.
         work: workspace of a string; filled with beads.
     """
@@ -328,7 +328,7 @@ def start_on_ellipsoid(
     is_bent = dot(unit(sets_out), unit(vector(work, 0))) < STRING_COSINE and (
         side == 0.0 or dot(outwards, middle) > 0.0
     )
-    if p[SURFACE.KIND] == SURFACE_TYPE.ELLIPSOID and (is_bent or bending == BENDING.PULLED):
+    if p[SURFACE.KIND] == SURFACE_TYPE.ELLIPSOID and (is_bent or bending == BENDING.STRING):
         result = start_on_string(p, turn, first, second, work)
     return result
 

@@ -208,7 +208,7 @@ def gather_derivatives(m: Fit, y: Floats) -> None:
                 # As in the composite-rigid-body algorithm: the Gauss-Newton matrix is a mass
                 # matrix.
                 angular, linear = spatial_momentum(i, turn, shift)
-                carried = displaced_moment(load, moments, turn, shift)
+                moment_change = displaced_moment(load, moments, turn, shift)
                 k = freedom
                 while k >= 0:
                     c = at(columns, 6 * k)
@@ -218,7 +218,7 @@ def gather_derivatives(m: Fit, y: Floats) -> None:
                     # these.
                     if k < j[LINK.FIRST_DOF]:
                         bend[size * freedom + k] = bend[size * k + freedom] = dot(
-                            vector(c, 0), carried
+                            vector(c, 0), moment_change
                         )
                     k = freedoms[DOF.SIZE * k + DOF.ABOVE]
             add_joint_curvature(m, y, link, load, moments)
@@ -254,7 +254,7 @@ def apply_couplers(m: Fit, y: Floats) -> None:
     for number in range(p[FIT.COUPLERS] - 1, -1, -1):
         i = at(p, p[p[FIT.COUPLER_AT] + number])
         dependent = i[COUPLER.DEPENDENT]
-        _, bent = evaluate_coupler(m, i, y, gradient, rates)
+        _, curvature = evaluate_coupler(m, i, y, gradient, rates)
         for k in range(i[COUPLER.COUNT]):
             freedom = i[COUPLER.ARGUMENTS + k]
             if freedom < 0:
@@ -268,7 +268,7 @@ def apply_couplers(m: Fit, y: Floats) -> None:
                 stiffness[size * freedom + j] += gain * stiffness[size * dependent + j]
                 bend[size * freedom + j] += gain * bend[size * dependent + j]
             if i[COUPLER.COUNT] == 1:
-                bend[size * freedom + freedom] += bent * slope[dependent]
+                bend[size * freedom + freedom] += curvature * slope[dependent]
             slope[freedom] += gain * slope[dependent]
             for j in range(count_equations(m)):
                 rows[size * j + freedom] += gain * rows[size * j + dependent]
@@ -301,13 +301,13 @@ def evaluate_coupler(
     size = i[COUPLER.COUNT]
     constants = at(m.c, i[COUPLER.NUMBERS])
     if int(constants[size]) >= FUNCTION_TYPE.MONOMIALS:
-        value, _, bent = evaluate_monomials(
+        value, _, curvature = evaluate_monomials(
             size, at(i, COUPLER.ARGUMENTS), constants, y, rates, gradient
         )
-        return value, bent
+        return value, curvature
     argument = 0.0
     if size > 0:
         argument = y[i[COUPLER.ARGUMENTS]] if i[COUPLER.ARGUMENTS] >= 0 else constants[0]
-    value, slope, bent = evaluate_function(at(constants, size), argument)
+    value, slope, curvature = evaluate_function(at(constants, size), argument)
     gradient[0] = slope
-    return value, bent
+    return value, curvature

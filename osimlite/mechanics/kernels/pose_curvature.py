@@ -63,11 +63,11 @@ def add_joint_curvature(m: Fit, y: Floats, link: int, load: Floats, moments: Flo
     axis_ranges = at(p, p[FIT.AXES_AT])
     for outer_axis in range(axis_ranges[link], axis_ranges[link + 1]):
         turn, shift = axis_column(m, y, link, outer_axis)
-        carried = displaced_moment(load, moments, turn, shift)
+        moment_change = displaced_moment(load, moments, turn, shift)
         # An axis carries itself and those after it.
         for inner_axis in range(axis_ranges[link], outer_axis + 1):
-            around, _ = axis_column(m, y, link, inner_axis)
-            amount = dot(around, carried)
+            rotation_axis, _ = axis_column(m, y, link, inner_axis)
+            amount = dot(rotation_axis, moment_change)
             add_axis_product(m, y, inner_axis, outer_axis, amount)
             if inner_axis < outer_axis:
                 add_axis_product(m, y, outer_axis, inner_axis, amount)
@@ -139,14 +139,14 @@ def axis_column(m: Fit, y: Floats, link: int, number: int) -> tuple[Vector, Vect
     axis = axis_ints(m, number)
     j = operation_ints(model, axis[0])
     a = operation_work(model, data, axis[0])
-    around, center = vector(a, OPERATION_WORK.AXIS), vector(a, OPERATION_WORK.POINT)
+    rotation_axis, center = vector(a, OPERATION_WORK.AXIS), vector(a, OPERATION_WORK.POINT)
     if axis[1] >= SLIDES:
         axis_index = axis[1] - SLIDES
         sign = 1.0 if j[OPERATION.MOTION] == MOTION.BALL else -1.0
         return ZERO, times(sign, (a[axis_index], a[3 + axis_index], a[6 + axis_index]))
     if axis[1] >= 0:
         # A column of a ball already is the axis of one angle, see `convert_ball_columns`.
-        around = vector(
+        rotation_axis = vector(
             data, model[MODEL.WORK_COLUMN] + 6 * model[j[OPERATION.ARGUMENTS] + axis[1]]
         )
         end_position = multiply_elementwise(
@@ -154,9 +154,9 @@ def axis_column(m: Fit, y: Floats, link: int, number: int) -> tuple[Vector, Vect
         )
         center = plus(center, turned_by(a, end_position))
     elif j[OPERATION.MOTION] != MOTION.TURN:
-        return ZERO, around
-    return around, cross(
-        minus(center, vector(link_work(model, data, link), LINK_WORK.ORIGIN)), around
+        return ZERO, rotation_axis
+    return rotation_axis, cross(
+        minus(center, vector(link_work(model, data, link), LINK_WORK.ORIGIN)), rotation_axis
     )
 
 

@@ -161,7 +161,7 @@ def fit_frame(m: Fit, y: Floats) -> tuple[float, int, float]:
         for k in range(size):
             trial[k] = (
                 y[k]
-                if p[p[FIT.RESOLVED_AT] + k] == FREEDOM.IDLE
+                if p[p[FIT.RESOLVED_AT] + k] == FREEDOM.UNDETERMINED
                 else 2.0 * last_pose[k] - earlier_pose[k]
             )
         if fulfil_constraints(m, trial):
@@ -268,7 +268,7 @@ def update_measured_pattern(m: Fit, y: Floats) -> None:
         return
     resolved = at(p, p[FIT.RESOLVED_AT])
     for k in range(size):
-        if resolved[k] == FREEDOM.IDLE:
+        if resolved[k] == FREEDOM.UNDETERMINED:
             resolved[k] = FREEDOM.VARIABLE
     evaluate_cost(m, y)
     for k in range(size):
@@ -277,7 +277,7 @@ def update_measured_pattern(m: Fit, y: Floats) -> None:
             and v[p[FIT.STIFFNESS] + size * k + k] == 0.0
             and v[p[FIT.SLOPE] + k] == 0.0
         ):
-            resolved[k] = FREEDOM.IDLE
+            resolved[k] = FREEDOM.UNDETERMINED
     for k in range(size):
         v[p[FIT.STEP] + k] = 0.0
     # A Gauss-Newton matrix that is singular leaves some direction undetermined.
@@ -415,7 +415,7 @@ def descend_to_minimum(
     size = m.model[MODEL.DOFS]
     step = at(v, p[FIT.STEP])
     previous_length = inf
-    bends = damping == MIN_DAMPING
+    uses_hessian = damping == MIN_DAMPING
     status = UNCONVERGED
     copy_numbers(size, start, y)
     steps = 0
@@ -427,7 +427,7 @@ def descend_to_minimum(
             evaluate_cost(m, y)
         find_active_range_ends(m, y)
         # Without a convex model, add damping; the Gauss-Newton model needs little.
-        if not find_step(m, y, damping, bends) and not find_step(m, y, damping, False):
+        if not find_step(m, y, damping, uses_hessian) and not find_step(m, y, damping, False):
             damping = max(10.0 * damping, FIRST_DAMPING)
             if damping > MAX_DAMPING:
                 break
@@ -454,7 +454,7 @@ def descend_to_minimum(
             damping = max(0.1 * damping, lightest)
             # Where poses fit alike, use the complete Hessian last: far from the minimum it is
             # misleading.
-            bends = steps >= GAUSS_NEWTON_STEPS or (
+            uses_hessian = steps >= GAUSS_NEWTON_STEPS or (
                 damping < FIRST_DAMPING and lightest == MIN_DAMPING
             )
         else:
@@ -463,7 +463,7 @@ def descend_to_minimum(
                 status = FITTED
                 break
             damping = max(10.0 * damping, FIRST_DAMPING)
-            bends = steps >= GAUSS_NEWTON_STEPS
+            uses_hessian = steps >= GAUSS_NEWTON_STEPS
             previous_length = inf
             if damping > MAX_DAMPING:
                 break

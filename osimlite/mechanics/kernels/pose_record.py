@@ -96,7 +96,7 @@ class FREEDOM(metaclass=Record):
     """Degree of freedom that is a function of others."""
     AT_END = 3
     """Free degree of freedom that is at an end of its range."""
-    IDLE = 4
+    UNDETERMINED = 4
     """Free degree of freedom that moves nothing that is measured."""
 
 

@@ -105,14 +105,14 @@ def release_range_ends(m: Fit) -> None:
             p[p[FIT.RESOLVED_AT] + k] = FREEDOM.VARIABLE
 
 
-def find_step(m: Fit, y: Floats, damping: float, bends: bool) -> bool:
+def find_step(m: Fit, y: Floats, damping: float, uses_hessian: bool) -> bool:
     """Compute the step of all coordinates to the minimum of the model within the ranges.
 
     Args:
         m: inputs and workspace of the fit.
         y: state.
         damping: damping of the step.
-        bends: whether the model includes the part of the Hessian beyond Gauss-Newton.
+        uses_hessian: whether the model includes the part of the Hessian beyond Gauss-Newton.
 
     Returns:
         Whether the model is convex.
@@ -127,7 +127,7 @@ def find_step(m: Fit, y: Floats, damping: float, bends: bool) -> bool:
     # are solved again.
     while True:
         free = list_free_coordinates(m)
-        solution = solve_free(m, free, damping, 1.0 if bends else 0.0, MIN_PIVOT)
+        solution = solve_free(m, free, damping, 1.0 if uses_hessian else 0.0, MIN_PIVOT)
         if solution < 0:
             return False
         result = at(v, solution)

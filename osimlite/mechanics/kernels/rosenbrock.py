@@ -130,7 +130,7 @@ def rosenbrock(
     # A step that almost reaches the limit is stretched or cut to it.
     t1 = h[METHOD_WORK.LAST_TIME] if h[METHOD_WORK.LAST_TIME] <= t0 + 1.001 * step else t0 + step
     # A step that was cut much shorter is no basis for the size of the next one.
-    cut = t1 - t0 < 0.95 * step
+    is_shortened = t1 - t0 < 0.95 * step
     step = t1 - t0
     c = DIAGONAL * step
     error = inf
@@ -165,7 +165,7 @@ def rosenbrock(
         )
         return OUTCOME.OK
     h[METHOD_WORK.REACHED], h[ROSENBROCK_WORK.IS_NEW] = t1, 0.0
-    if factor < 1.0 or (factor >= MIN_GROWTH and not cut):
+    if factor < 1.0 or (factor >= MIN_GROWTH and not is_shortened):
         h[METHOD_WORK.NEXT_STEP] = min(factor, MAX_STEP_FACTOR) * step
     return OUTCOME.OK
 

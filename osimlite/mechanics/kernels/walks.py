@@ -69,7 +69,7 @@ class Walk(NamedTuple):
     m: Motion  # run of the walk
     sensor_plan: Ints  # plan of the sensor row, see `sensors`
     sensor_numbers: Floats  # numbers of the sensor row
-    driven: Ints  # offset of each control in the numbers of the model (c,)
+    control_offsets: Ints  # offset of each control in the numbers of the model (c,)
     plan: Ints  # integers of the reflexes, see `reflexes`
     numbers: Floats  # numbers of the reflexes
     criteria: Ints  # integers of the criteria, see `criteria`
@@ -193,7 +193,7 @@ def walk_several(
     peaks: Floats,
     sensor_plan: Ints,
     sensor_numbers: Floats,
-    driven: Ints,
+    control_offsets: Ints,
     plan: Ints,
     numbers: Floats,
     criteria: Ints,
@@ -223,7 +223,7 @@ def walk_several(
             changed.
         sensor_plan: plan of the sensor rows, see `sensors.SENSOR_PLAN`.
         sensor_numbers: numbers of the sensor rows, see `sensors.SENSOR_NUMBERS`.
-        driven: offsets in reals of the excitations.
+        control_offsets: offsets in reals of the excitations.
         plan: integers of the reflexes, see `reflexes.REFLEXES`.
         numbers: numbers of the reflexes of each walk (walks, `REFLEXES.NUMBERS`), see
             `reflexes.LIMITS`.
@@ -252,7 +252,7 @@ def walk_several(
             m,
             sensor_plan,
             sensor_numbers,
-            driven,
+            control_offsets,
             plan,
             at(numbers, plan[REFLEXES.NUMBERS] * k),
             criteria,
@@ -285,7 +285,7 @@ def begin_walk(a: Walk, y: Floats, order: int) -> int:
     m = a.m
     # Sensors before the first control step are those without excitations.
     for k in range(a.sensor_plan[SENSOR_PLAN.CONTROLS]):
-        m.reals[a.driven[k]] = 0.0
+        m.reals[a.control_offsets[k]] = 0.0
     status = evaluate_state(m, 0.0, y, at(m.data, m.model[MODEL.WORK_STATE]), STAGE.FORCE)
     if status != OUTCOME.OK:
         return status
@@ -386,7 +386,7 @@ def take_control_steps(a: Walk, y: Floats, steps: int, is_recorded: bool) -> Non
 def apply_excitations(a: Walk) -> None:
     """Write the excitations to the actuators."""
     for k in range(a.sensor_plan[SENSOR_PLAN.CONTROLS]):
-        a.m.reals[a.driven[k]] = a.excitations[k]
+        a.m.reals[a.control_offsets[k]] = a.excitations[k]
 
 
 def criteria_work(a: Walk) -> Floats:
@@ -434,7 +434,7 @@ def run_by_reflexes(
     endings: Ints,
     sensor_plan: Ints,
     sensor_numbers: Floats,
-    driven: Ints,
+    control_offsets: Ints,
     plan: Ints,
     numbers: Floats,
     work: Floats,
@@ -469,7 +469,7 @@ def run_by_reflexes(
         sensor_plan: plan of the sensor rows, see `sensors.SENSOR_PLAN`.
         sensor_numbers: numbers of the sensor row of each run (runs, `SENSOR_PLAN.NUMBERS`), see
             `sensors.SENSOR_NUMBERS`.
-        driven: offsets in reals of the excitations.
+        control_offsets: offsets in reals of the excitations.
         plan: integers of the reflexes, see `reflexes.REFLEXES`.
         numbers: numbers of the reflexes of each run (runs, `REFLEXES.NUMBERS`), see
             `reflexes.LIMITS`.
@@ -507,7 +507,7 @@ def run_by_reflexes(
             m,
             sensor_plan,
             at(sensor_numbers, sensor_plan[SENSOR_PLAN.NUMBERS] * k),
-            driven,
+            control_offsets,
             plan,
             at(numbers, plan[REFLEXES.NUMBERS] * k),
             plan,

@@ -86,7 +86,7 @@ def bend_around_cylinder(
     length: float,
     axis: int,
     side: float,
-    alone: bool,
+    is_single: bool,
     e: Floats,
 ) -> int:
     """Bend a segment around a cylinder.
@@ -98,7 +98,7 @@ def bend_around_cylinder(
         length: length of the cylinder (m).
         axis: axis of the quadrant: 0 for x, 1 for y, 2 for z.
         side: sign of the quadrant along this axis, 0.0 for the complete surface.
-        alone: whether the path has no other PathWrap.
+        is_single: whether the path has no other PathWrap.
         e: record of the law; filled with tangent points and length.
 
     Returns:
@@ -126,18 +126,18 @@ def bend_around_cylinder(
         on_far_side = is_long = False
     else:
         # One path around the cylinder is from a1 to b2, the other from b1 to a2.
-        wide = dot(a1, b2) < dot(b1, a2)
+        is_wide = dot(a1, b2) < dot(b1, a2)
         from_a = starts_at_a(
             set_height(a1, pz),
             set_height(b1, pz),
             set_height(a2, qz),
             set_height(b2, qz),
-            wide,
+            is_wide,
             axis,
             side,
         )
         first_tangent, second_tangent = (a1, b2) if from_a else (b1, a2)
-        on_far_side = from_a == wide
+        on_far_side = from_a == is_wide
         is_long = (
             dot(
                 plus(first_tangent, second_tangent),
@@ -174,7 +174,7 @@ def bend_around_cylinder(
         angle = 2.0 * pi - angle
         turn = -angle
     # OpenSim smooths the heights only if a path has several PathWraps.
-    if not alone:
+    if not is_single:
         z1, z2 = smooth_heights(first, second, (x1, y1, z1), (x2, y2, z2), radius * angle, turn)
     store_vector(e, WRAP_WORK.FIRST_TANGENT, (x1, y1, z1))
     store_vector(e, WRAP_WORK.SECOND_TANGENT, (x2, y2, z2))
@@ -216,7 +216,7 @@ def set_height(point: Vector, height: float) -> Vector:
 
 
 def starts_at_a(
-    a1: Vector, b1: Vector, a2: Vector, b2: Vector, wide: bool, axis: int, side: float
+    a1: Vector, b1: Vector, a2: Vector, b2: Vector, is_wide: bool, axis: int, side: float
 ) -> bool:
     """Return whether the path from a1 to b2, and not that from b1 to a2, is on the active side.
 
@@ -227,14 +227,14 @@ def starts_at_a(
         b1: second candidate of the first end.
         a2: first candidate of the second end.
         b2: second candidate of the second end.
-        wide: whether the path from a1 to b2 is the wider one.
+        is_wide: whether the path from a1 to b2 is the wider one.
         axis: axis of the quadrant: 0 for x, 1 for y, 2 for z.
         side: sign of the quadrant along this axis.
     """
     a_active = is_on_side(a1, axis, side)
     if a_active != is_on_side(b1, axis, side):
         return a_active
-    return not is_on_side(a2, axis, side) and (a_active or is_on_side(b2, axis, side) or wide)
+    return not is_on_side(a2, axis, side) and (a_active or is_on_side(b2, axis, side) or is_wide)
 
 
 def apex_between(first: Vector, second: Vector, radius: float, on_far_side: bool) -> Vector:

@@ -230,24 +230,26 @@ def support_point(
         return closest_point(radii, middle), 0.0, True
     # OpenSim's axial method uses the plane of symmetry across the largest component of the segment.
     axis = longest_axis(ray)
-    passes = -component(start, axis) / component(chord, axis)
-    axial = closest_in_plane(radii, add_scaled(start, passes, chord), axis)
+    crossing = -component(start, axis) / component(chord, axis)
+    axial = closest_in_plane(radii, add_scaled(start, crossing, chord), axis)
     if method == ELLIPSOID_METHOD.AXIAL:
-        return axial, 0.0, 0.0 < passes < 1.0
+        return axial, 0.0, 0.0 < crossing < 1.0
     cosine = abs(component(unit(ray), axis))
     # Where the chord crosses this plane near one of its ends, the fan is phased in.
-    fade = max(0.0, min(passes, 1.0 - passes) / FAN_PHASE_IN)
+    fade = max(0.0, min(crossing, 1.0 - crossing) / FAN_PHASE_IN)
     if cosine > ALL_FAN and fade < 1.0:
         cosine = ALL_FAN + fade * (cosine - ALL_FAN)
     if cosine >= NO_FAN:
         return axial, 0.0, True
-    fanned = closest_point(radii, plus(middle, mean_outward_direction(radii, start, chord, work)))
+    fan_point = closest_point(
+        radii, plus(middle, mean_outward_direction(radii, start, chord, work))
+    )
     if cosine <= ALL_FAN:
-        return fanned, 1.0, True
+        return fan_point, 1.0, True
     # Between both limits OpenSim blends the axial and the fanned point.
     axial_weight = (cosine - ALL_FAN) / (NO_FAN - ALL_FAN)
     return (
-        closest_point(radii, add_scaled(times(axial_weight, axial), 1.0 - axial_weight, fanned)),
+        closest_point(radii, add_scaled(times(axial_weight, axial), 1.0 - axial_weight, fan_point)),
         1.0 - axial_weight,
         True,
     )

@@ -150,9 +150,9 @@ def tendon_energy(strain: float, toe: float, growth: float, factor: float, slope
         slope: slope of the linear region.
     """
     # Split at the end of the toe, so that each part is integrated in its own form.
-    bent = min(max(strain, 0.0), toe)
+    toe_strain = min(max(strain, 0.0), toe)
     straight = max(strain - toe, 0.0)
-    return factor * ((exp(growth * bent) - 1.0) / growth - bent) + straight * (
+    return factor * ((exp(growth * toe_strain) - 1.0) / growth - toe_strain) + straight * (
         TOE_FORCE + 0.5 * slope * straight
     )
 

@@ -336,9 +336,9 @@ class _Search:
         return (ahead - behind) / 2e-6
 
     def _spread_over_coordinates(self, step: Array) -> Array:
-        full = np.zeros(len(self.target))
-        full[self.free] = step
-        return full
+        complete_step = np.zeros(len(self.target))
+        complete_step[self.free] = step
+        return complete_step
 
 
 def _compute_position_errors(state: MechanismKinematics) -> Array:

@@ -269,10 +269,10 @@ class _Builder:
             index = {ground: GROUND} | {
                 branch.outer: number for number, branch in enumerate(branches)
             }
-            loose = [path for path in self.bodies if path not in index]
-            if not loose:
+            unjoined_bodies = [path for path in self.bodies if path not in index]
+            if not unjoined_bodies:
                 break
-            edges.append(self._add_free_joint(new_base(loose, edges), ground))
+            edges.append(self._add_free_joint(new_base(unjoined_bodies, edges), ground))
         bodies = []
         for edge, outer, backward in branches:
             carrier = edge.child if backward else edge.parent
@@ -290,11 +290,11 @@ class _Builder:
                 # into a constraint.
                 if self.opensim_derivatives:
                     repeated_mass = mass_properties(self.bodies[edge.child], edge.child)
-                    carried = edge.build_mobilizer(reversed=False)
+                    mobilizer = edge.build_mobilizer(reversed=False)
                     path = f"{edge.child}_again{len(bodies)}"
                     bodies.append(
                         MobileBody(
-                            _get_last_name(path), path, index[edge.parent], repeated_mass, carried
+                            _get_last_name(path), path, index[edge.parent], repeated_mass, mobilizer
                         )
                     )
             elif edge.child == ground or edge.kind == "FreeJoint":

@@ -42,19 +42,19 @@ class Branch(NamedTuple, Generic[L]):
     reversed: bool  # whether it leads from its child to its parent
 
 
-def new_base(loose: Sequence[str], links: Sequence[JointEdge]) -> str:
+def new_base(unjoined_bodies: Sequence[str], links: Sequence[JointEdge]) -> str:
     """Return the body that OpenSim connects to ground, of bodies without connection to it.
 
     It is a body that is no child of a joint, if there is such a body, and of these the parent of
     most joints.
 
     Args:
-        loose: paths of the bodies.
+        unjoined_bodies: paths of the bodies.
         links: joints between bodies or ground.
     """
     children = {link.child for link in links}
     parents = [link.parent for link in links]
-    return max(loose, key=lambda path: (path not in children, parents.count(path)))
+    return max(unjoined_bodies, key=lambda path: (path not in children, parents.count(path)))
 
 
 def spanning_tree(

@@ -236,8 +236,8 @@ class TriangleMesh:
         np.minimum.at(bound, point_index, squares)
         # Where triangles meet, the one most perpendicular to the offset decides what is inside.
         height = np.einsum("ij,ij->i", offsets, self.normals[triangles])
-        near = np.flatnonzero(squares <= _AS_NEAR * bound[point_index])
-        order = near[np.lexsort((-np.abs(height[near]), point_index[near]))]
+        candidates = np.flatnonzero(squares <= _AS_NEAR * bound[point_index])
+        order = candidates[np.lexsort((-np.abs(height[candidates]), point_index[candidates]))]
         best = order[np.unique(point_index[order], return_index=True)[1]]
         return result[best], height[best] > 0.0
 
@@ -287,22 +287,22 @@ def _edges_cross(one: TriangleMesh, two: TriangleMesh) -> bool:
     # Each edge belongs to two triangles and is tested once.
     edges = edges[edges[:, 0] < edges[:, 1]]
     start, end = one.points[edges[:, 0]], one.points[edges[:, 1]]
-    near = np.ones((len(edges), len(two.triangles)), dtype=bool)
+    is_candidate = np.ones((len(edges), len(two.triangles)), dtype=bool)
     for axis in range(3):
         low, high = two.corners[:, :, axis].min(axis=1), two.corners[:, :, axis].max(axis=1)
-        near &= np.minimum(start[:, axis], end[:, axis])[:, None] <= high
-        near &= np.maximum(start[:, axis], end[:, axis])[:, None] >= low
-    edge, triangle = np.nonzero(near)
+        is_candidate &= np.minimum(start[:, axis], end[:, axis])[:, None] <= high
+        is_candidate &= np.maximum(start[:, axis], end[:, axis])[:, None] >= low
+    edge, triangle = np.nonzero(is_candidate)
     a, b, c = np.moveaxis(two.corners[triangle], 1, 0)
     p, q = start[edge], end[edge]
     # The ends are on different sides of the plane, and the line passes all edges on the same side.
     normal = two.normals[triangle]
-    divided = _dot_rows(p - a, normal) * _dot_rows(q - a, normal) <= 0.0
+    crosses_plane = _dot_rows(p - a, normal) * _dot_rows(q - a, normal) <= 0.0
     hands = [_dot_rows(q - p, np.cross(u - p, v - p)) for u, v in ((a, b), (b, c), (c, a))]
     same = np.all([hand >= 0.0 for hand in hands], axis=0) | np.all(
         [hand <= 0.0 for hand in hands], axis=0
     )
-    return bool(np.any(divided & same))
+    return bool(np.any(crosses_plane & same))
 
 
 def _dot_rows(a: Array, b: Array) -> Array:

@@ -121,14 +121,14 @@ class _ObservedCopies:
             )
         controls = np.clip(values, *self._limits)
         observation_before = self.observe(controls)
-        succeeded = self.copies.step_all(controls)
+        has_succeeded = self.copies.step_all(controls)
         observation_after = self.observe(controls)
         # States of a copy whose integration failed may be undefined; its reward is 0.
         with np.errstate(all="ignore"):
             rewards = np.where(
-                succeeded, self.task.reward(observation_before, observation_after), 0.0
+                has_succeeded, self.task.reward(observation_before, observation_after), 0.0
             )
-        return rewards, ~succeeded | self.task.is_over(observation_after)
+        return rewards, ~has_succeeded | self.task.is_over(observation_after)
 
     def draw_image(self, copy_index: int = 0) -> Any:
         """Return the image of a copy (height, width, 3)."""
@@ -343,16 +343,20 @@ class MuscleVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
             Observations (w, o), rewards (w,), whether each copy has failed (w,), whether the time
             of its episode is over (w,), and an empty dictionary.
         """
-        restarted = np.flatnonzero(self._ended)
+        restarted_rows = np.flatnonzero(self._ended)
         # All copies are stepped, then those with a new episode are set to their initial state.
-        initial = {int(k): self._reset_state(int(k)) for k in restarted}
+        initial = {int(k): self._reset_state(int(k)) for k in restarted_rows}
         rewards, has_failed = self._all.step(actions)
         for k, state in initial.items():
             self._all.copies.set_states(k, state)
         self._steps += 1
         # gymnasium's NEXT_STEP mode: the step after an end returns the first observation and no
         # reward.
-        self._steps[restarted], rewards[restarted], has_failed[restarted] = 0, 0.0, False
+        self._steps[restarted_rows], rewards[restarted_rows], has_failed[restarted_rows] = (
+            0,
+            0.0,
+            False,
+        )
         # Truncation by time differs from termination: the learner may still expect future rewards.
         is_out_of_time = self._steps >= self._all.max_steps
         self._ended = has_failed | is_out_of_time

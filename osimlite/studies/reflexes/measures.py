@@ -186,14 +186,16 @@ class Measure(ABC):
         if self.minimize and self.threshold is not None:
             threshold, transition = self.threshold, self.transition
             # In the transition the value rises from 0 at the threshold to its full size at the end.
-            blended = value * (value - threshold) / transition if transition > 0.0 else value
+            blended_value = value * (value - threshold) / transition if transition > 0.0 else value
             value = np.where(
-                value < threshold, 0.0, np.where(value < threshold + transition, blended, value)
+                value < threshold,
+                0.0,
+                np.where(value < threshold + transition, blended_value, value),
             )
-        weighted: Array = self.weight * value
+        weighted_value: Array = self.weight * value
         # A composite measure has collected the terms of its parts, its own would count them twice.
-        self.terms = self.terms or {self.name: weighted}
-        return weighted
+        self.terms = self.terms or {self.name: weighted_value}
+        return weighted_value
 
     def read_recorded(self, offset: int, index: int) -> Array:
         """Return a number of a criterion from the workspaces of the candidates (w,).

@@ -120,10 +120,10 @@ class Window:
             # On a slow screen, drawing takes at most half of the time.
             self._next = time.perf_counter() + max(FRAME_S, time.perf_counter() - began)
             if SPACE in self.read_pressed_keys():
-                stopped = time.perf_counter()
+                pause_start = time.perf_counter()
                 while SPACE not in self.read_pressed_keys():
                     time.sleep(FRAME_S)
-                self._start = self._start[0], self._start[1] + time.perf_counter() - stopped
+                self._start = self._start[0], self._start[1] + time.perf_counter() - pause_start
 
     def hold(self) -> None:
         """Show the last pose until the user closes the window or presses Escape."""
