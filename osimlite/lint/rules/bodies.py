@@ -41,9 +41,9 @@ MASS = Threshold("largest-mass", 1000.0, "kg", "largest plausible mass of a body
 def report_missing_mass(subject: Subject, report: FindingCollector) -> None:
     """A body has no mass.
 
-    Reports bodies whose mass is not given.
+    Reports bodies without a `<mass>`.
 
-    The default is NaN: OpenSim rejects the file.
+    The default mass is NaN: OpenSim rejects the file.
 
     ```xml
     - <Body name="thigh"> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
@@ -65,11 +65,12 @@ def report_missing_mass(subject: Subject, report: FindingCollector) -> None:
 def report_impossible_inertia(subject: Subject, report: FindingCollector) -> None:
     """An inertia violates the triangle inequality.
 
-    Reports inertias whose largest principal moment exceeds the sum of the other two, and by how
-    much: no distribution of mass has such an inertia.
+    Reports inertias whose largest principal moment is larger than the sum of the other two, and by
+    how many per cent.
 
-    Such a body cannot exist. OpenSim computes with it anyway, and accelerations about that axis are
-    too small. Often two numbers are swapped, or the inertia was scaled axis by axis.
+    No distribution of mass has such an inertia, so the body cannot exist. OpenSim computes with it
+    anyway: accelerations about the axis of the largest moment are too small. Often two numbers are
+    swapped, or the inertia was scaled with a separate factor for each axis.
 
     ```xml
     - <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.5 0 0 0</inertia> </Body>
@@ -98,11 +99,11 @@ def report_impossible_inertia(subject: Subject, report: FindingCollector) -> Non
 def report_inertia_not_positive(subject: Subject, report: FindingCollector) -> None:
     """An inertia has a negative principal moment.
 
-    Reports inertias that are negative about some axis: a negative moment, or products that are too
-    large for the moments.
+    Reports inertias that are negative about some axis: one of the moments is negative, or the
+    products of inertia are too large for the moments.
 
-    A torque about that axis turns the body the other way. OpenSim does not check, and the
-    simulation becomes unstable or gives wrong results without a message.
+    A torque about that axis accelerates the body in the opposite direction. OpenSim does not check
+    the inertia: the simulation becomes unstable, or gives wrong results without a message.
 
     ```xml
     - <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0.3 0 0</inertia> </Body>
@@ -129,12 +130,13 @@ def report_inertia_not_positive(subject: Subject, report: FindingCollector) -> N
 def report_no_inertia(subject: Subject, report: FindingCollector) -> None:
     """A body has mass and no inertia.
 
-    Reports bodies with a mass whose inertia is zero or missing; and, for information, bodies
-    without a mass that have an inertia, which OpenSim sets to zero with a line in its log.
+    Reports bodies that have a mass, but an inertia that is zero or missing. As an info, the rule
+    reports bodies that have an inertia but no mass: OpenSim sets their inertia to zero, and says so
+    in its log.
 
-    All the mass is then in one point. Nothing resists a joint that rotates about this point:
-    accelerations become NaN if the body is the last of its chain (an error), and the integrator
-    takes ever smaller steps otherwise.
+    OpenSim treats the mass of the body as one point: nothing resists a rotation about this point.
+    If the body is the last of its chain and its joint rotates it about this point, accelerations
+    become NaN (an error). Otherwise the integrator may take ever smaller steps.
 
     ```xml
     - <Body name="thigh"> <mass>8</mass> </Body>
@@ -183,14 +185,14 @@ def _spins_freely(subject: Subject, body: Body) -> bool:
 
 @rule("OSIM523", "mass-out-of-proportion", severity=WARNING, thresholds=(MASS, GYRATION))
 def report_mass_out_of_proportion(subject: Subject, report: FindingCollector) -> None:
-    """A mass, or an inertia for its mass, is implausibly large.
+    """A mass is implausibly large, or an inertia is implausibly large for its mass.
 
-    Reports bodies heavier than a tonne, and inertias that would need the mass to lie several metres
-    from the mass center (the radius of gyration, the square root of the largest moment over the
-    mass).
+    Reports bodies heavier than a tonne. Also reports bodies whose radius of gyration is more than 5
+    m: the square root of their largest moment of inertia divided by their mass. The mass would then
+    have to lie several metres from the mass center.
 
-    Most often the unit is wrong: grams for kilograms, or kg mm^2 (a million times as much) for kg
-    m^2. The model moves as if its limbs were cast in lead, and no force in it fits.
+    Most often the unit is wrong: grams for kilograms, or kg mm^2 for kg m^2 (a million times as
+    much). All forces of the model are then far too small to move its limbs.
 
     ```xml
     - <Body name="thigh"> <mass>8</mass> <inertia>100000 100000 20000 0 0 0</inertia> </Body>

@@ -24,14 +24,15 @@ from osimlite.schema.specs import FieldSpec, get_field_specs
 def report_unknown_class(subject: Subject, report: FindingCollector) -> None:
     """An object has a class that OpenSim does not have.
 
-    Reports elements where objects are expected, whose tag is not a class of OpenSim 4.6: misspelt, in
-    the wrong case, or of a plug-in. Suggests a class with a similar name if it is allowed there and
-    has the properties that the element contains.
+    Reports elements whose tag is not a class of OpenSim 4.6, in places where OpenSim expects an
+    object. The tag is misspelt, has the wrong letter case, or is a class of a plug-in. The rule
+    suggests a class with a similar name, if that class is allowed there and at least half of the
+    elements inside are its properties.
 
-    In a set (bodies, joints, forces ...) OpenSim rejects the file; elsewhere it leaves the object
-    out. For a class of a plug-in, OpenSim must load the plug-in first; the rest of the file is
-    checked anyway. The setting `classes` names files that declare the classes of plug-ins to
-    osimlite.
+    In a set (bodies, joints, forces ...) OpenSim rejects the file. Elsewhere it leaves the object
+    out, or rejects the file as well; the message says which. If the class belongs to a plug-in,
+    OpenSim must load the plug-in first. osimlite then checks the rest of the file, but not this
+    object. The setting `classes` names files that declare the classes of plug-ins to osimlite.
 
     ```xml
     - <MarkerSet> <objects> <Merker name="asis" /> </objects> </MarkerSet>
@@ -155,9 +156,10 @@ def _can_contain(specs: Mapping[str, FieldSpec], tag: str) -> bool:
 def report_wrong_class(subject: Subject, report: FindingCollector) -> None:
     """An object is in a place where its class is not allowed.
 
-    Reports members of a set, or of another property, whose class the property does not accept.
+    Reports objects whose class is not allowed in the set, or in the property, that contains them.
 
-    In a set OpenSim rejects the file; elsewhere it leaves the object out.
+    In a set OpenSim rejects the file. Elsewhere it leaves the object out, or rejects the file as
+    well; the message says which.
 
     ```xml
     - <MarkerSet> <objects> <Body name="foot"> <mass>1</mass> </Body> </objects> </MarkerSet>
@@ -190,12 +192,12 @@ def report_wrong_class(subject: Subject, report: FindingCollector) -> None:
 
 @rule("OSIM108", "wrong-part-name", severity=ERROR, fixes="unsafe", consequences=(RUNS,))
 def report_wrong_part_name(subject: Subject, report: FindingCollector) -> None:
-    """An object in a property does not have the name of the property.
+    """The `name` of an object is not that of its property.
 
-    Reports objects such as `<FrameGeometry name="axes">`: OpenSim finds the object of a property by
-    its name.
+    Reports objects such as `<FrameGeometry name="axes">` in a body. OpenSim finds the object of a
+    property by its `name`, which must be that of the property: `frame_geometry` in this case.
 
-    OpenSim ignores the object and uses the default: everything inside is lost.
+    OpenSim ignores the object with everything inside, and uses the default of the property.
 
     ```xml
       <Body name="thigh">
@@ -229,9 +231,10 @@ def report_wrong_part_name(subject: Subject, report: FindingCollector) -> None:
 def report_missing_wrapper(subject: Subject, report: FindingCollector) -> None:
     """Members of a set are outside its `<objects>`.
 
-    Reports objects that are placed directly in a set, or in the object that should list them.
+    Reports objects that stand directly in a set instead of in its `<objects>`. Also reports objects
+    that stand directly in a component instead of in a list such as `<coordinates>`.
 
-    OpenSim reads members inside `<objects>` only, and ignores these.
+    OpenSim reads only the objects inside the list, and ignores the others.
 
     ```xml
       <MarkerSet>

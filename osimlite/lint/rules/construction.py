@@ -32,11 +32,11 @@ _QUOTED = compile_later(r"'([^']+)'")
 def report_impossible_mechanism(subject: Subject, report: FindingCollector) -> None:
     """The bodies, joints and constraints of a model do not form a mechanism.
 
-    Builds the mechanism as `osimlite simulate` does, and reports what stops that: a joint, frame,
-    function or constraint that cannot be computed, and that no other rule has reported.
+    Builds the mechanism as `osimlite simulate` does. Reports each joint, frame, function or
+    constraint that cannot be computed, unless another rule has reported its cause.
 
-    OpenSim rejects such a model, or computes with undefined values. Commands that compute reject
-    it.
+    OpenSim rejects such a model, or computes with undefined values. The commands of osimlite that
+    compute with a model reject it.
 
     ```xml
       <Coordinate name="knee_angle">
@@ -56,12 +56,13 @@ def report_impossible_mechanism(subject: Subject, report: FindingCollector) -> N
 def report_unmet_constraint(subject: Subject, report: FindingCollector) -> None:
     """No pose of the model fulfils a constraint.
 
-    Assembles the default pose, and reports each constraint that the nearest pose does not fulfil,
-    with how far it is from that (m, or rad for constraints of angles).
+    Assembles the default pose: searches for the nearest pose that fulfils all constraints. Reports
+    each constraint that is still not fulfilled, with its remaining error (m, or rad for constraints
+    of angles).
 
-    OpenSim logs that it is unable to assemble the model and relaxes the constraints; its integrator
-    then fails to start. Usual causes are a length in millimetres, both ends on one body, and two
-    locked or prescribed coordinates that a constraint connects.
+    OpenSim logs that it cannot assemble the model, and relaxes the constraints; its integrator then
+    fails to start. Usual causes are a length in millimetres, a constraint with both ends on one
+    body, and a constraint between two coordinates that are locked or prescribed.
 
     ```xml
       <ConstantDistanceConstraint name="rod">
@@ -82,11 +83,12 @@ def report_unmet_constraint(subject: Subject, report: FindingCollector) -> None:
 def report_range_not_kept(subject: Subject, report: FindingCollector) -> None:
     """A clamped coordinate leaves its range in the default pose.
 
-    Assembles the default pose, and reports clamped coordinates that a constraint or their
-    prescribed function takes out of their range.
+    Assembles the default pose. Reports clamped coordinates that leave their range because of a
+    constraint, or because of their prescribed function.
 
-    OpenSim logs an error for a constraint, and nothing for a function; then it simulates, and the
-    clamp has no effect. Widen the range, or correct the constraint.
+    If a constraint is the cause, OpenSim logs an error; if a function is the cause, it logs
+    nothing. In both cases OpenSim simulates, and the clamp has no effect. Widen the range, or
+    correct the constraint or the function.
 
     ```xml
       <Coordinate name="knee_angle">
@@ -108,12 +110,12 @@ def report_range_not_kept(subject: Subject, report: FindingCollector) -> None:
 def report_singular_mass_matrix(subject: Subject, report: FindingCollector) -> None:
     """A coordinate moves no mass in the default pose.
 
-    Evaluates the accelerations in the default pose, and reports the coordinate without inertia:
-    nothing beyond its joint has mass, or its axis is that of another coordinate of a body without
-    mass.
+    Computes the accelerations in the default pose, and reports a coordinate that moves no mass.
+    Either no body beyond its joint has mass, or its axis coincides with the axis of another
+    coordinate, and the body between them has no mass.
 
-    The mass matrix has no inverse. OpenSim gives no message: every acceleration is NaN, or of a
-    size that only rounding decides.
+    The mass matrix has no inverse. OpenSim gives no message: every acceleration is NaN, or a
+    meaningless number that depends on rounding errors.
 
     ```xml
     - <Body name="shank"> <mass>0</mass> </Body>
@@ -144,11 +146,12 @@ def report_singular_mass_matrix(subject: Subject, report: FindingCollector) -> N
 def report_impossible_force(subject: Subject, report: FindingCollector) -> None:
     """A force, a controller or a probe cannot be computed.
 
-    Builds all forces, controllers and probes as `osimlite simulate` does, and reports failures that
-    no other rule has reported. It is a warning where OpenSim computes with a doubtful number.
+    Builds all forces, controllers and probes as `osimlite simulate` does. Reports those that cannot
+    be built, unless another rule has reported the cause. The finding is a warning if OpenSim can
+    compute the component: it is disabled, or has a number that OSIM207 reports.
 
-    OpenSim rejects such a model when it builds the system, or fails when it needs the force.
-    Commands that compute reject it.
+    OpenSim rejects such a model when it builds the system, or fails when it needs the force. The
+    commands of osimlite that compute with a model reject it.
 
     ```xml
       <ComponentSet>
@@ -179,9 +182,9 @@ def report_impossible_force(subject: Subject, report: FindingCollector) -> None:
 def report_no_acceleration(subject: Subject, report: FindingCollector) -> None:
     """The accelerations of a model are not finite in the default pose.
 
-    Evaluates the accelerations in the default pose, and reports the forces that make them NaN or
-    infinite. It is a warning where only the rate of a muscle state is not finite, as before
-    equilibration.
+    Computes the accelerations in the default pose, and reports the forces that make them NaN or
+    infinite. The finding is a warning if only the rate of a muscle state is not finite, which can
+    happen before the muscle is put into equilibrium.
 
     OpenSim gives no message: every acceleration is NaN from the start, and so is the motion.
 
@@ -239,12 +242,12 @@ def _find_undefined_formulas(subject: Subject) -> Iterator[ExpressionBasedFuncti
 def report_not_computed(subject: Subject, report: FindingCollector) -> None:
     """OpenSim runs a component that osimlite cannot compute.
 
-    Reports joints, constraints, forces and controllers of OpenSim's own classes that `osimlite
-    simulate` and the other commands that compute do not know. Of each class, the first is reported,
-    with the number of the others.
+    Reports joints, constraints, forces and controllers of OpenSim's own classes with which
+    `osimlite simulate` and similar commands cannot compute. Only the first component of each class
+    is reported, with the number of the others.
 
-    The model is correct. Commands that compute reject it, or leave the component out with
-    `--skip-unsupported`.
+    The model is correct. But commands that compute with the model reject it. With the option
+    `--skip-unsupported` they leave the component out instead.
 
     ```xml
       <Coordinate name="knee_angle">
@@ -283,12 +286,14 @@ def report_not_computed(subject: Subject, report: FindingCollector) -> None:
 def report_impassable_obstacle(subject: Subject, report: FindingCollector) -> None:
     """A path cannot wrap over an obstacle.
 
-    Reports paths over obstacles (Scholz2015GeometryPath) with a point, or another obstacle, inside
-    an obstacle in the default pose, as written or as assembled; paths over a ContactMesh; and paths
-    whose search fails because a `contact_hint` is in the middle of the surface or unsuitable.
+    Reports three faults of paths over obstacles (Scholz2015GeometryPath). First, a point of the
+    path or another obstacle is inside an obstacle in the default pose, before or after assembly.
+    Second, an obstacle is a ContactMesh. Third, the search for the path fails because a
+    `contact_hint` is in the middle of the surface or unsuitable.
 
-    OpenSim rejects the model: it computes the path when it initialises the system. A GeometryPath,
-    in contrast, goes straight through a surface that contains one of its points (OSIM616).
+    OpenSim computes the path when it initialises the system, and then rejects the model. A
+    GeometryPath, in contrast, goes straight through a surface that contains one of its points
+    (OSIM616).
 
     ```xml
       <PathSpring name="cable">

@@ -23,11 +23,11 @@ from osimlite.schema.tree import Use
 def report_contact_without_partner(subject: Subject, report: FindingCollector) -> None:
     """A contact force has no pair of surfaces that can touch.
 
-    Reports contact forces whose parameter sets together list fewer than two contact geometries;
-    and forces whose surfaces cannot touch: all are on one body, or have shapes between which
-    OpenSim computes no contact. A HuntCrossleyForce acts between two surfaces that are spheres,
-    ellipsoids or half-spaces, but not between two half-spaces. An ElasticFoundationForce acts
-    between a mesh and another mesh, a sphere or a half-space.
+    Reports contact forces that list fewer than two contact geometries in all their parameter sets
+    together. Also reports forces whose surfaces cannot touch: all are on one body, or OpenSim
+    computes no contact between their shapes. A HuntCrossleyForce acts between two surfaces that are
+    spheres, ellipsoids or half-spaces, but not between two half-spaces. An ElasticFoundationForce
+    acts between a mesh and another mesh, a sphere or a half-space.
 
     Such a force never acts, and OpenSim gives no message.
 
@@ -99,7 +99,7 @@ def _explain_missing_contact(subject: Subject, force: Component, uses: list[Use]
 def report_contact_listed_twice(subject: Subject, report: FindingCollector) -> None:
     """A contact force lists the same surface twice.
 
-    Reports every mention of a contact geometry after the first within one force.
+    Reports every repeated name of a contact geometry in the lists of one force.
 
     OpenSim counts the surface twice, and the force is doubled.
 
@@ -138,7 +138,7 @@ def report_unused_contact_geometry(subject: Subject, report: FindingCollector) -
 
     Reports contact geometry that no force and no path refers to.
 
-    It has no effect; often a force should list it.
+    Such a geometry has no effect. Often a force should list it.
 
     ```xml
       <ContactSphere name="toe"> <socket_frame>/bodyset/shank</socket_frame> <radius>0.02</radius> </ContactSphere>

@@ -57,11 +57,11 @@ ORIENTATION = Threshold(
 def report_inverted_range(subject: Subject, report: FindingCollector) -> None:
     """The range of a coordinate ends before it begins.
 
-    Reports ranges whose first number is larger than the second; an error if the coordinate is
-    clamped.
+    Reports ranges whose first number is larger than the second. The finding is an error if the
+    coordinate is clamped.
 
-    OpenSim rejects a clamped coordinate like this. Otherwise it does not check, and user interfaces
-    and solvers that use the range misbehave.
+    If the coordinate is clamped, OpenSim rejects the model. Otherwise OpenSim does not check the
+    range, but user interfaces and solvers that use the range misbehave.
 
     ```xml
       <PinJoint name="knee">
@@ -95,10 +95,10 @@ def report_inverted_range(subject: Subject, report: FindingCollector) -> None:
 def report_default_outside_range(subject: Subject, report: FindingCollector) -> None:
     """The default value of a coordinate lies outside its range.
 
-    Reports such defaults; an error if the coordinate is clamped.
+    Reports default values outside the range. The finding is an error if the coordinate is clamped.
 
-    OpenSim rejects a clamped coordinate like this. Otherwise the model starts in a pose outside its
-    range; often the range or the default is in degrees.
+    If the coordinate is clamped, OpenSim rejects the model. Otherwise the model starts in a pose
+    outside the range. Often the range or the default value is in degrees.
 
     ```xml
     - <Coordinate name="knee_angle"> <default_value>0.3</default_value> <range>-2.1 0</range> </Coordinate>
@@ -196,11 +196,11 @@ def report_prescribed_without_function(subject: Subject, report: FindingCollecto
 def report_degrees_for_radians(subject: Subject, report: FindingCollector) -> None:
     """An angle seems to be in degrees.
 
-    Reports rotational coordinates whose default value or range goes beyond five turns, in radians,
-    and frames, surfaces and wrap objects that are rotated by more than one turn.
+    Reports rotational coordinates whose default value or range, read in radians, is beyond five
+    turns. Also reports frames, surfaces and wrap objects that are rotated by more than one turn.
 
-    Coordinates are in radians (only the limits of a CoordinateLimitForce are in degrees); 90 is
-    more than fourteen turns.
+    OpenSim reads these angles in radians, in which 90 is more than fourteen turns. (Only the limits
+    of a CoordinateLimitForce are in degrees.)
 
     ```xml
       <PinJoint name="knee">

@@ -31,11 +31,12 @@ if TYPE_CHECKING:
 def report_made_up_coordinate(subject: Subject, report: FindingCollector) -> None:
     """An axis of a custom joint names a coordinate that the joint does not declare.
 
-    Reports such names where OpenSim accepts the model; where it rejects the model, the name is
-    reported as an unresolved reference. It is a warning if the joint declares no coordinate at all.
+    Reports such names if OpenSim accepts the model. If OpenSim rejects the model because of the
+    name, OSIM301 reports an unresolved reference instead. The finding is a warning if the joint
+    declares no coordinate at all.
 
-    OpenSim creates a coordinate of that name without a message: the joint gets an additional degree
-    of freedom with the value 0, and the axis does not follow the intended coordinate.
+    OpenSim creates a coordinate with that name, without a message. The joint gets an additional
+    degree of freedom with the value 0, and the axis does not follow the intended coordinate.
 
     ```xml
       <TransformAxis name="translation1">
@@ -109,11 +110,12 @@ def report_axis_without_coordinate(subject: Subject, report: FindingCollector) -
 def report_collinear_axes(subject: Subject, report: FindingCollector) -> None:
     """Two rotations, or two translations, of a custom joint have the same axis.
 
-    Reports axes of a custom joint that are parallel to an earlier axis of the same kind, or have no
-    length.
+    Reports rotation axes that are parallel to an earlier rotation axis of the same joint, and
+    translation axes that are parallel to an earlier translation axis. Also reports axes of length
+    0.
 
-    OpenSim rejects the file, also if an axis moves nothing. Give each unused axis a different
-    direction.
+    OpenSim rejects the file, even if nothing moves along or about the axis. Give each unused axis a
+    different direction, too.
 
     ```xml
       <TransformAxis name="rotation1"> <axis>0 0 1</axis> </TransformAxis>
@@ -158,13 +160,14 @@ def report_collinear_axes(subject: Subject, report: FindingCollector) -> None:
 def report_idle_coordinate(subject: Subject, report: FindingCollector) -> None:
     """A coordinate of a custom joint moves nothing.
 
-    Reports coordinates that no axis uses, and coordinates whose functions do not change with them
-    in the default pose: constant functions, functions with the weight 0, or functions of one
-    variable that read another coordinate.
+    Reports coordinates that no axis uses. Also reports coordinates that do not change the value of
+    any axis function in the default pose: the functions are constant, have the weight 0, or read
+    only another coordinate. Also reports joints whose coordinates all together produce fewer
+    independent motions than there are coordinates.
 
-    The joint has a degree of freedom without motion, so the mass matrix cannot be inverted: all
-    accelerations of the joint become NaN, without a message, also if the coordinate is locked or
-    prescribed.
+    The joint has a degree of freedom without motion, so the mass matrix has no inverse. All
+    accelerations of the joint become NaN, without a message. This happens even if the coordinate is
+    locked or prescribed.
 
     ```xml
       <TransformAxis name="rotation1">

@@ -58,14 +58,14 @@ def describe_consequence(
 def report_not_finite(subject: Subject, report: FindingCollector) -> None:
     """A number is NaN, or infinite where that is not allowed.
 
-    Reports NaN in any number, and infinity except in bounds (ranges, smallest and largest
-    controls), where it stands for an unlimited value.
+    Reports NaN in any number. Reports infinity everywhere except in bounds (ranges, smallest and
+    largest controls), where it means that there is no limit.
 
-    OpenSim accepts it in a single number or a vector without a message, and everything computed
-    from it becomes NaN: the simulation runs to its end without a result. It rejects a file with
-    such a number in a list, such as the points of a function or the `time_range` of inverse
-    dynamics. In properties for drawing, in bounds,
-    and in forces and controllers that are disabled, it is a warning: the motion is not affected.
+    OpenSim accepts such a single number or vector without a message. Everything that is computed
+    from it becomes NaN: the simulation runs to its end without a result. In a list, such as the
+    points of a function or the `time_range` of inverse dynamics, OpenSim rejects the file. The
+    finding is a warning in properties for drawing, in bounds, and in disabled forces and
+    controllers: the motion is not affected.
 
     ```xml
     - <gravity>0 NaN 0</gravity>
@@ -137,9 +137,9 @@ def _is_older_list(kind: object) -> bool:
 def report_impossible_value(subject: Subject, report: FindingCollector) -> None:
     """A number makes OpenSim fail or compute NaN.
 
-    Reports values outside their domain that OpenSim is known to reject or to compute wrong results
-    with. Examples are a contact stiffness of 0, a negative mass, and a limit force with a
-    `transition` of 0, or of so few degrees that they are lost when they are added to the limit.
+    Reports numbers outside the valid range of their property, if OpenSim is known to reject them,
+    to fail or to compute NaN. Examples are a contact stiffness of 0, a negative mass, and a
+    CoordinateLimitForce with a `transition` of 0 or nearly 0.
 
     OpenSim gives no message for most of them. A contact stiffness of 0 gives 0/0 as soon as the
     surfaces touch.
@@ -185,14 +185,14 @@ def _report_lost_transition(subject: Subject, report: FindingCollector, force: A
 def report_doubtful_value(subject: Subject, report: FindingCollector) -> None:
     """A number is outside the sensible range of its property.
 
-    Reports numbers outside the domain that the property declares: a negative radius or dissipation,
-    an opacity of 3. Also reports numbers of 1e20 and more (1e100 and more are an error), positive
-    sizes of 1e-20 and less (1e-100 and less are an error), and optimal fiber lengths of damped
-    Millard muscles below 1e-6 m (3e-8 m and less are an error).
+    Reports numbers outside the valid range of their property, such as a negative radius or
+    dissipation, or an opacity of 3. Also reports numbers of 1e20 and more (errors from 1e100), and
+    positive sizes of 1e-20 and less (errors up to 1e-100). In damped Millard muscles it reports
+    optimal fiber lengths below 1e-6 m (errors up to 3e-8 m).
 
-    OpenSim computes with it anyway: a negative dissipation adds energy in each impact, and a sphere
-    with a negative radius touches nothing. Powers of numbers beyond 1e100 are infinite: OpenSim
-    computes NaN, or fails.
+    OpenSim computes with most of these numbers anyway. A negative dissipation adds energy in each
+    impact, and a sphere with a negative radius touches nothing. Powers of numbers beyond 1e100 are
+    infinite: OpenSim computes NaN, or fails.
 
     ```xml
     - <ContactSphere name="heel"> <socket_frame>/bodyset/shank</socket_frame> <radius>-0.05</radius> </ContactSphere>

@@ -24,8 +24,9 @@ def report_ends_in_one_place(subject: Subject, report: FindingCollector) -> None
     """Both ends of a force coincide in the default pose.
 
     Reports PointToPointSprings, PointToPointActuators and ExpressionBasedPointToPointForces whose
-    two points coincide in the default pose, and paths with two consecutive points that are on
-    different bodies and coincide there. Forces with `appliesForce` false are not checked.
+    two points coincide in the default pose. Also reports paths in which two consecutive points are
+    on different bodies, but coincide in the default pose. Forces with `appliesForce` false are not
+    checked.
 
     The force has no direction. OpenSim gives no message: every acceleration of the model is NaN,
     even if the force is zero.
@@ -78,8 +79,8 @@ def report_ends_in_one_place(subject: Subject, report: FindingCollector) -> None
 def report_spring_on_one_body(subject: Subject, report: FindingCollector) -> None:
     """Both ends of a PointToPointSpring are on one body.
 
-    Reports PointToPointSprings whose two frames are the same or are fixed to the same body, also
-    those with `appliesForce` false.
+    Reports PointToPointSprings whose two frames are the same or are fixed to the same body, even if
+    `appliesForce` is false.
 
     OpenSim rejects the model. Other forces between two points may have both ends on one body, where
     they have no effect.
@@ -112,7 +113,7 @@ def report_spring_on_one_body(subject: Subject, report: FindingCollector) -> Non
 def report_external_force_in_model(subject: Subject, report: FindingCollector) -> None:
     """A model contains an ExternalForce.
 
-    Reports ExternalForces of a model; they belong in an ExternalLoads file, which names the file
+    Reports ExternalForces in a model. They belong in an ExternalLoads file, which names the file
     with the measured forces.
 
     OpenSim rejects the model, since the force has no data. It does so even if `appliesForce` is

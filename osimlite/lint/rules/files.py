@@ -20,13 +20,13 @@ from osimlite.schema.resolution import is_a
 def report_missing_mesh(subject: Subject, report: FindingCollector) -> None:
     """A mesh file does not exist.
 
-    Looks for the file of each mesh where OpenSim does: beside the model, in the folder
-    `Geometry` next to the model, and in the folders that the configuration names. Suggests a file whose name differs
-    in letter case only, and one that is found with / instead of a backslash.
+    Looks for the file of each mesh in the same places as OpenSim: beside the model, in a folder
+    `Geometry` next to it, and in the folders of the configuration. If a file differs only in letter
+    case, or is found with / instead of a backslash, the rule suggests this file.
 
-    OpenSim draws nothing for such a mesh. It rejects a model with a missing contact mesh. A name in
-    the wrong case works on Windows and macOS and fails on Linux; a name with a backslash works on
-    Windows only.
+    OpenSim draws nothing for such a mesh. If the mesh is a contact mesh, OpenSim rejects the model.
+    A name in the wrong case works on Windows and macOS and fails on Linux; a name with a backslash
+    works on Windows only.
 
     ```xml
       <Body name="thigh"> <attached_geometry>
@@ -113,14 +113,14 @@ def report_missing_mesh(subject: Subject, report: FindingCollector) -> None:
 def report_included_file(subject: Subject, report: FindingCollector) -> None:
     """An object is stored in another file.
 
-    Reports `file=` on an object, for information. It is a warning if that file does not exist, does
-    not contain the object, is not an ordinary file (a pipe, a device) or is larger than the setting
-    `largest-file` allows. It is an error if the element itself has content, or if the file cannot
-    be read and another component refers to the object.
+    Reports objects with the attribute `file`, as an info. The finding is a warning if that file
+    does not exist, lacks the object, is not an ordinary file (a pipe, a device), or is larger than
+    the setting `largest-file`. The finding is an error if the element itself has content. It is
+    also an error if the file cannot be read and another component refers to the object.
 
-    OpenSim reads the object from the other file, and rewrites that file when it saves the model; if
-    the file is missing, it continues with an empty object. It ignores the content of an element
-    with `file=`.
+    OpenSim reads the object from the other file, and ignores the content of the element. When it
+    saves the model, it overwrites the other file, too. If the file is missing, OpenSim continues
+    with an empty object.
 
     ```xml
     - <MarkerSet file="markers.xml" />
@@ -195,13 +195,13 @@ def _has_content(source: Source | None, number: int) -> bool:
 
 @rule("OSIM703", "missing-data-file", severity=ERROR, consequences=(REFUSES, RUNS))
 def report_missing_data_file(subject: Subject, report: FindingCollector) -> None:
-    """A file of measured loads, of controls or of a table does not exist.
+    """A file with measured loads, with controls or with a table does not exist.
 
     Looks for the files of external loads, of controllers and of table sources beside the model and
     in the working folder of the program.
 
-    OpenSim rejects the model when it connects the components; only a ControlSetController
-    continues, without controls.
+    OpenSim rejects the model when it connects the components. The only exception is the file of a
+    ControlSetController: OpenSim then continues without controls.
 
     ```xml
       <CoordinateActuator name="motor"> <coordinate>knee_angle</coordinate> </CoordinateActuator>

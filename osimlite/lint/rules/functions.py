@@ -44,11 +44,11 @@ def report_unsorted_abscissae(subject: Subject, report: FindingCollector) -> Non
     Reports the first x that is smaller than the previous one, and for splines also the first that
     is equal to it.
 
-    OpenSim rejects a GCVSpline, or fails when a force or a controller needs its value. A SimmSpline
-    divides by the difference without a message and gives values in the millions; piecewise
-    functions use the wrong piece. Moment arms and moving points are then wrong. Where the same
-    point is given twice, a SimmSpline is constant (a warning). A disabled controller or force never
-    computes its functions (a warning).
+    A GCVSpline with such points is rejected, or makes OpenSim fail when a force or a controller
+    needs its value. A SimmSpline divides by the difference of the x values and gives values in the
+    millions, without a message. A piecewise function uses the wrong piece. Moment arms and moving
+    points are then wrong. If the same point is given twice, a SimmSpline is constant there (a
+    warning). OpenSim does not compute the functions of a disabled controller or force (a warning).
 
     ```xml
       <Coordinate name="knee_angle">
@@ -105,10 +105,10 @@ def report_unsorted_abscissae(subject: Subject, report: FindingCollector) -> Non
 def report_unequal_points(subject: Subject, report: FindingCollector) -> None:
     """A function has different numbers of x and y values.
 
-    Reports tabulated functions whose lists differ in length. Too many y values are a warning.
+    Reports functions whose lists `x` and `y` differ in length. Too many y values are a warning.
 
-    Where y values are missing OpenSim reads undefined memory beyond the end of the list; it rejects
-    a GCVSpline. It ignores extra y values.
+    If y values are missing, OpenSim rejects a GCVSpline. For other functions it reads undefined
+    memory beyond the end of the list. OpenSim ignores extra y values.
 
     ```xml
       <Coordinate name="knee_angle">
@@ -144,8 +144,8 @@ def report_unequal_points(subject: Subject, report: FindingCollector) -> None:
 def report_too_few_points(subject: Subject, report: FindingCollector) -> None:
     """A function has too few points.
 
-    Reports a SimmSpline of fewer than two points, a GCVSpline of fewer than twice its half order or
-    without a half order, and piecewise functions without any.
+    Reports a SimmSpline with fewer than two points, and piecewise functions without points. Also
+    reports a GCVSpline without a `half_order`, or with fewer points than twice its `half_order`.
 
     A SimmSpline is then NaN everywhere, a GCVSpline is rejected, and a piecewise function returns
     undefined values.
@@ -204,10 +204,10 @@ def report_coefficient_count(subject: Subject, report: FindingCollector) -> None
     function of a joint axis or a coordinate coupler needs one coefficient for each coordinate, and
     a constant. Fewer are an error, more are a warning (an error if there is no coordinate).
 
-    OpenSim crashes on an empty list of a linear function, and fails when it needs the value of such
-    a polynomial. Where the constant of a linear function is missing, it reads beyond the end of the
-    list. Of too many coefficients it uses the first as weights, the next as the constant, and
-    ignores the rest.
+    If a linear function has no coefficients, OpenSim crashes. If a polynomial has the wrong number,
+    OpenSim fails when it needs the value. If the constant of a linear function is missing, OpenSim
+    reads beyond the end of the list. If there are too many coefficients, it uses the first ones as
+    weights and the next one as the constant, and ignores the rest.
 
     ```xml
       <Coordinate name="knee_angle">
@@ -283,13 +283,13 @@ def report_coefficient_count(subject: Subject, report: FindingCollector) -> None
 def report_function_of_several(subject: Subject, report: FindingCollector) -> None:
     """A function of one variable is given several coordinates.
 
-    Reports splines, piecewise functions, polynomials, sines and steps on an axis of a CustomJoint,
-    or in a CoordinateCouplerConstraint, that names more than one coordinate; and
-    MultivariatePolynomialFunctions whose `dimension` is not the number of the coordinates.
+    Reports splines, piecewise functions, polynomials, sines and steps that get more than one
+    coordinate from an axis of a CustomJoint or from a CoordinateCouplerConstraint. Also reports
+    MultivariatePolynomialFunctions whose `dimension` is not the number of coordinates.
 
     OpenSim gives no message. It mixes values and derivatives of different coordinates, so the
-    motion is wrong. A LinearFunction takes any number of coordinates, a
-    MultivariatePolynomialFunction those of its dimension.
+    motion is wrong. A LinearFunction takes any number of coordinates. A
+    MultivariatePolynomialFunction takes exactly as many as its `dimension` says.
 
     ```xml
       <CoordinateCouplerConstraint name="follow">
@@ -342,9 +342,9 @@ def report_missing_function(subject: Subject, report: FindingCollector) -> None:
     """A required function is missing.
 
     Reports MultiplierFunctions, CoordinateCouplerConstraints and FunctionBasedPaths without a
-    function inside, and empty functions of MovingPathPoints and FunctionBasedBushingForces; and
-    PrescribedForces whose number of functions for the force, its point or the torque is neither
-    zero nor three.
+    function inside, and empty functions of MovingPathPoints and FunctionBasedBushingForces. A
+    PrescribedForce needs either no function or three functions for each of the force, its point and
+    the torque; other numbers are reported.
 
     OpenSim rejects the model, or fails when it needs the value. Scaling a model wraps functions in
     multipliers; deleting the function later leaves an empty multiplier.

@@ -51,8 +51,8 @@ def report_wrong_coordinate_count(subject: Subject, report: FindingCollector) ->
     Reports joints with more or fewer coordinates than their class has, custom joints with a
     coordinate that none of their axes uses, and (as a warning) joints without coordinates.
 
-    OpenSim rejects the model. Where `<coordinates>` is missing it creates coordinates with names
-    such as `_coord_0` and the value 0.
+    OpenSim rejects the model if the number is wrong. If `<coordinates>` is missing, it creates
+    coordinates with names such as `_coord_0` and the value 0.
 
     ```xml
       <PinJoint name="knee">
@@ -123,11 +123,11 @@ def _declares_none(subject: Subject, joint: Joint) -> bool:
 def report_shared_coordinate_name(subject: Subject, report: FindingCollector) -> None:
     """Two joints have a coordinate of the same name.
 
-    Reports the second coordinate with a name, and the forces and other components that refer to the
-    name. Without references it is a warning.
+    Reports the second of two coordinates with the same name, and the forces and other components
+    that use this name. If no component uses the name, the finding is a warning.
 
-    Forces, actuators and constraints find a coordinate by its name, and always find the first: two
-    limit forces then act on one knee, and none on the other.
+    Forces, actuators and constraints find a coordinate by its name, and always find the first one.
+    Two limit forces then act on one knee, and none on the other.
 
     ```xml
       <PinJoint name="knee">
@@ -174,7 +174,7 @@ def report_ground_as_child(subject: Subject, report: FindingCollector) -> None:
 
     Reports joints whose child frame is fixed to ground.
 
-    It is allowed: OpenSim reverses the joint internally, and the coordinate keeps its meaning from
+    OpenSim allows this: it reverses the joint internally, and the coordinate keeps its meaning from
     parent to child. But other programs expect chains that start at ground.
 
     ```xml
@@ -204,12 +204,13 @@ def report_ground_as_child(subject: Subject, report: FindingCollector) -> None:
 def report_stray_joint_frame(subject: Subject, report: FindingCollector) -> None:
     """A joint contains an unrelated frame.
 
-    Reports frames in the `<frames>` of a joint that are fixed to neither of the bodies it connects.
-    It is an error if that body is further from ground than the joint's child.
+    Reports frames in the `<frames>` of a joint that are fixed to neither of the bodies that the
+    joint connects. The finding is an error if the body of such a frame is further from ground than
+    the child of the joint.
 
-    OpenSim builds joints from ground outwards, with the frames of each joint: a frame on a body
-    that is not yet built ends in a message about an invalid index. Usually a socket names the wrong
-    frame.
+    OpenSim builds joints from ground outwards, and each joint with its frames. If the body of a
+    frame is not built yet, OpenSim stops with a message about an invalid index. Usually a socket
+    names the wrong frame.
 
     ```xml
       <PinJoint name="hip">
@@ -259,13 +260,13 @@ _LOCK_SINE = 1e-8
 def report_gimbal_lock(subject: Subject, report: FindingCollector) -> None:
     """A joint is in gimbal lock in the default pose.
 
-    Reports GimbalJoints, and CustomJoints with three rotations, whose second rotation is a right
-    angle by default, which aligns the third axis with the first.
+    Reports GimbalJoints, and CustomJoints with three rotations, whose second angle is a right angle
+    in the default pose. The third axis is then parallel to the first.
 
-    The joint loses one direction of rotation, the mass matrix is singular, and every acceleration
+    The joint loses one direction of rotation, and the mass matrix is singular. Every acceleration
     of the model is NaN, or beyond 1e12 rad/s^2 because of rounding, even if the coordinates are
-    locked. Inverse kinematics works, but the two angles are arbitrary. A default value that differs
-    by 0.001 is enough; a BallJoint has no such pose.
+    locked. Inverse kinematics works, but the first and the third angle are arbitrary. Change the
+    default value by 0.001 rad, or use a BallJoint, which has no gimbal lock.
 
     ```xml
       <Body name="foot"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>
@@ -310,11 +311,12 @@ def report_nimble_ellipsoid(subject: Subject, report: FindingCollector) -> None:
     """An ellipsoid joint was made for nimblephysics, which moves it differently from OpenSim.
 
     Reports ellipsoid joints whose coordinates are abduction, elevation and upward rotation, in this
-    order, and those of models that AddBiomechanics wrote.
+    order. Also reports all ellipsoid joints of models that AddBiomechanics wrote.
 
-    AddBiomechanics, SKEL and BioAMASS use nimblephysics. It rotates by Ry(q0) Rx(-q1) Rz(q2), OpenSim
-    by Rx(q0) Ry(q1) Rz(q2), so that the child is decimetres away from where it should be.
-    `osimlite modify --from nimble` writes a model that moves in OpenSim as in nimblephysics.
+    AddBiomechanics, SKEL and BioAMASS use nimblephysics, which rotates by Ry(q0) Rx(-q1) Rz(q2).
+    OpenSim rotates by Rx(q0) Ry(q1) Rz(q2). In OpenSim, the child body is therefore decimetres away
+    from where it should be. `osimlite modify --from nimble` writes a model that moves in OpenSim as
+    in nimblephysics.
 
     ```xml
       <Body name="scapula"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>

@@ -26,11 +26,12 @@ from osimlite.schema.specs import get_field_specs
 def report_unknown_attribute(subject: Subject, report: FindingCollector) -> None:
     """An element has an attribute without meaning.
 
-    Reports attributes of objects other than `name` and `file`; on an element that is not an object
-    it is a warning. Attributes of XML itself (`xmlns`, and all with a colon) are for information.
+    Reports all attributes of objects except `name` and `file`. An attribute of an element that is
+    not an object is a warning. Attributes of XML itself (`xmlns`, and all with a colon) are an
+    info.
 
-    OpenSim ignores them: properties are elements, not attributes. osimlite keeps attributes of
-    objects when it writes a model; those of other elements are lost.
+    OpenSim ignores such attributes: properties are elements, not attributes. When osimlite writes a
+    model, it keeps attributes of objects, and loses attributes of other elements.
 
     ```xml
     - <Marker name="asis" fixed="true"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
@@ -125,9 +126,9 @@ def _find_ignored_attributes(subject: Subject) -> Iterator[tuple[int, str, str]]
 def report_stray_text(subject: Subject, report: FindingCollector) -> None:
     """There is text between elements.
 
-    Reports text beside elements, where only elements have a meaning.
+    Reports text in places where OpenSim expects only elements.
 
-    OpenSim ignores it without a message. It is often the rest of a tag: a value that lost its
+    OpenSim ignores the text without a message. It is often the rest of a tag: a value that lost its
     element, or half a comment.
 
     ```xml
@@ -191,10 +192,11 @@ def _find_stray_texts(source: Source) -> Iterator[tuple[int, str]]:
 def report_defaults_block(subject: Subject, report: FindingCollector) -> None:
     """The file has a `<defaults>` block.
 
-    Reports `<defaults>`: a warning if it has content, otherwise for information. Values that
-    OpenSim cannot read in objects of tools (CMC_Joint) are errors: it rejects the file.
+    Reports `<defaults>` blocks: a warning if the block has content, an info if it is empty. The
+    finding is an error if an object of a tool in the block (such as CMC_Joint) has a value that
+    OpenSim cannot read: OpenSim then rejects the file.
 
-    Each object inside replaces the defaults of its class in the whole running program, for this
+    Each object in the block replaces the defaults of its class in the running program, for this
     file and for all files loaded later. The meaning of a model then depends on the files loaded
     before it. osimlite applies the block to its own file only.
 
@@ -240,8 +242,9 @@ def report_force_outside_set(subject: Subject, report: FindingCollector) -> None
     Reports forces, actuators and muscles in the `<components>` of the model or of one of its
     components, or in the ComponentSet. Each such list is reported once.
 
-    Such forces act on the model. But OpenSim lists forces, actuators and muscles from the ForceSet
-    only, so controllers, probes, static optimization and CMC do not find a muscle elsewhere.
+    Such forces act on the model. But OpenSim searches for forces, actuators and muscles only in the
+    ForceSet. Controllers, probes, static optimization and CMC do not find a muscle that is
+    elsewhere.
 
     ```xml
     - <components>
@@ -272,10 +275,10 @@ def report_force_outside_set(subject: Subject, report: FindingCollector) -> None
 def report_not_upgradable(subject: Subject, report: FindingCollector) -> None:
     """OpenSim cannot upgrade an old document.
 
-    Reports content that OpenSim needs to upgrade a document of an older version, and that is
-    missing or unreadable: a body without `<Joint>`, a marker without `<body>`, a transform that is
-    not six finite numbers, a display preference that is not a whole number, a connector without a
-    name.
+    Reports missing or unreadable content without which OpenSim cannot upgrade a document of an
+    older version. Examples are a body without `<Joint>`, a marker without `<body>`, and a connector
+    without a name. Others are a transform that is not six finite numbers, and a display preference
+    that is not a whole number.
 
     OpenSim rejects the file. `osimlite upgrade` is more lenient, and writes the current format.
 

@@ -19,11 +19,11 @@ _MIN_SPREAD_M = 0.02
 def report_marker_units(table: Table, report: FindingCollector) -> None:
     """The units of a marker file do not fit its numbers.
 
-    Checks the spread of the markers in each frame: more than 8 m or less than 2 cm is not a moving
-    body.
+    Reports a marker file in which the markers of a frame are usually spread over more than 8 m or
+    less than 2 cm. No moving body is so large or so small.
 
-    OpenSim reads millimetres as metres without a message: inverse kinematics ends with errors of
-    kilometres, and a scaled model is a thousand times too large.
+    OpenSim reads millimetres as metres without a message. Inverse kinematics then ends with errors
+    of kilometres, and a scaled model is a thousand times too large.
 
     ```trc
       PathFileType→4→(X/Y/Z)→walk.trc
@@ -73,11 +73,11 @@ def _measure_spread(sample: list[float]) -> float | None:
 def report_marker_gap(table: Table, report: FindingCollector) -> None:
     """A marker is at the origin, or has only some of its coordinates.
 
-    Reports markers at 0 0 0, where some programs put missing markers, markers with one or two empty
-    cells, and (for information) markers that no frame has.
+    Reports markers at 0 0 0, where some programs put missing markers, and markers with one or two
+    empty cells. As an info it reports markers that are missing in all frames.
 
-    OpenSim takes 0 0 0 as the position of the marker and bends the model towards it. A marker with
-    one empty cell is missing in that frame.
+    OpenSim takes 0 0 0 as the position of the marker and bends the model towards it. If a cell of a
+    marker is empty, the marker is missing in that frame.
 
     ```trc
       PathFileType→4→(X/Y/Z)→walk.trc
@@ -113,9 +113,9 @@ def report_marker_gap(table: Table, report: FindingCollector) -> None:
 def report_frame_number(table: Table, report: FindingCollector) -> None:
     """The frames of a marker file are not numbered consecutively.
 
-    Compares the number of each frame with that of the frame before.
+    Compares the number of each frame with the number of the previous frame.
 
-    OpenSim ignores the numbers, but frames may have been removed or inserted.
+    OpenSim ignores the numbers. But a wrong number can mean that frames were removed or inserted.
 
     ```trc
       PathFileType→4→(X/Y/Z)→walk.trc

@@ -52,12 +52,12 @@ def report_character_reference(subject: Subject, report: FindingCollector) -> No
 def report_lenient_xml(subject: Subject, report: FindingCollector) -> None:
     """The text has an XML error that OpenSim tolerates.
 
-    Reports a bare `&`, `]]>`, two hyphens inside a comment, characters that XML does not have,
-    values of attributes without quotes, attributes without a blank between, and an XML declaration
-    that is malformed or not at the very beginning.
+    Reports a bare `&`, `]]>`, two hyphens inside a comment, and characters that XML does not have.
+    Also reports attribute values without quotes, attributes without a blank between them, and an
+    XML declaration that is malformed or not at the very beginning.
 
-    OpenSim's parser reads such a file, and most other XML readers reject it. It removes a bare `&`:
-    of `Anna & Bert` it keeps `Anna` and `Bert`.
+    OpenSim's parser reads such a file, but most other XML readers reject it. OpenSim removes a bare
+    `&`: from `Anna & Bert` it keeps `Anna` and `Bert`.
 
     ```xml
     - <credits>Anna & Bert</credits>

@@ -21,18 +21,18 @@ OFF = Threshold(
 def report_start_off_equilibrium(subject: Subject, report: FindingCollector) -> None:
     """A muscle starts far from equilibrium.
 
-    Reports muscles with an elastic tendon whose fibers, in the default pose and at their default
-    activation, start more than 0.1 optimal fiber lengths from their equilibrium length, or whose
-    tension is off by more than 0.1 `max_isometric_force`. A muscle that has no equilibrium in the
-    default pose is reported as a warning. Thelen2003Muscle, Millard2012EquilibriumMuscle and
-    DeGrooteFregly2016Muscle are checked.
+    Checks muscles with an elastic tendon in the default pose and at their default activation.
+    Reports a muscle whose fiber length differs from that in equilibrium by more than 0.1 optimal
+    fiber lengths. Also reports a muscle whose tendon force differs from that in equilibrium by more
+    than 0.1 `max_isometric_force`. A muscle without an equilibrium in this pose is a warning. The
+    rule checks Thelen2003Muscle, Millard2012EquilibriumMuscle and DeGrooteFregly2016Muscle.
 
     OpenSim equilibrates muscles only on request (`solve_for_equilibrium_for_auxiliary_states` of
-    ForwardTool, Model::equilibrateMuscles); otherwise fibers start with `default_fiber_length`, 0.1
-    m if it is missing. The tendon is then slack, or pulls with many times the strength of the
-    muscle, and the fibers move at hundreds of lengths per second: the first tenths of a second of
-    the motion are meaningless. Where there is no equilibrium OpenSim throws an exception when it is
-    asked for one. The equilibrium length of the fibers is a good default.
+    ForwardTool, Model::equilibrateMuscles). Without such a request, fibers start with
+    `default_fiber_length`, or with 0.1 m if it is missing. The tendon is then slack, or pulls with
+    many times the strength of the muscle. The fibers move at hundreds of lengths per second: the
+    first tenths of a second of the motion are meaningless. If a muscle has no equilibrium, the
+    request ends with an exception. As `default_fiber_length`, use the fiber length in equilibrium.
 
     ```xml
       <Millard2012EquilibriumMuscle name="flexor">
@@ -70,17 +70,18 @@ def report_start_off_equilibrium(subject: Subject, report: FindingCollector) -> 
 def report_fiber_limit(subject: Subject, report: FindingCollector) -> None:
     """The fibers of a muscle reach a limit within the ranges of the coordinates.
 
-    Reports three kinds of muscles. In the pose with the shortest path, their fully active fibers
-    reach the minimum length that pennation (`maximum_pennation_angle`) or the curve of active force
-    allows. In the pose with the longest path, their fibers at rest are longer than 2 optimal
-    lengths. Or they have no equilibrium in one of these poses. The poses are the default pose and
-    five values of each coordinate in the middle half of its range, with the others at their
-    defaults: at the ends of wide ranges most muscles reach a limit.
+    Checks the default pose, and five values of each coordinate with all other coordinates at their
+    defaults. The values are in the middle half of the range, because at the ends of wide ranges
+    most muscles reach a limit. In the pose with the shortest path, reports fully active fibers at
+    their minimum length. Pennation (`maximum_pennation_angle`) or the curve of active force
+    determines this length. In the pose with the longest path, reports fibers at rest that are
+    longer than 2 optimal lengths. Also reports a muscle without an equilibrium in one of these two
+    poses.
 
-    A muscle whose fibers cannot shorten further has a slack tendon and no force, whatever its
-    activation. Real fibers tear beyond twice their length. The lengths may belong to another
-    muscle, may not have been scaled, or the range of the coordinate is wider than that of the
-    joint.
+    If the fibers of a muscle cannot shorten further, its tendon is slack and it has no force,
+    whatever its activation. Real fibers tear beyond twice their optimal length. Often the lengths
+    belong to another muscle or were not scaled, or the range of the coordinate is wider than that
+    of the real joint.
 
     ```xml
       <Millard2012EquilibriumMuscle name="flexor">

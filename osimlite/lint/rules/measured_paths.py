@@ -23,18 +23,18 @@ OFF = Threshold(
 def report_wrong_wrapping(subject: Subject, report: FindingCollector) -> None:
     """OpenSim computes the length of a path around surfaces incorrectly.
 
-    Reports paths whose length in OpenSim differs by a millimetre or more from the length along
-    geodesics, the shortest lines on the surfaces: in the default pose, at one of nine values of
-    each coordinate over its range with the others at their defaults, or in one of 64 random poses
-    within the ranges. A negative number means that OpenSim's path is too short. Paths of OSIM633
-    are not reported here.
+    Compares the path length that OpenSim computes with the length along geodesics, the shortest
+    lines on the surfaces. Reports a path if the two lengths differ by a millimetre or more. A
+    negative number means that OpenSim's path is too short. The rule tries the default pose, and
+    nine values of each coordinate over its range, with all other coordinates at their defaults. It
+    also tries 64 random poses within the ranges. Paths that OSIM633 reports are left out.
 
-    Around several surfaces OpenSim iterates, but measures straight segments between tangent points
-    of an earlier iteration: paths are shorter than possible, and their forces have an unbalanced
-    moment. Around one ellipsoid or torus, and along a cylinder, it does not follow the shortest
-    line. The moment arm is then not the derivative of the length, so the work of the muscle does
-    not match its force and length. `osimlite muscles` and `osimlite simulate` compute the right
-    lengths with `--wrapping geodesic`.
+    For a path around several surfaces, OpenSim iterates, but measures the straight segments between
+    tangent points of an earlier iteration. Such a path is shorter than possible, and its forces
+    have an unbalanced moment. Around a single ellipsoid or torus, and along a cylinder, OpenSim's
+    path is not the shortest line. The moment arm is then not the derivative of the length, so the
+    work of the muscle does not match its force and length. `osimlite muscles` and `osimlite
+    simulate` compute the right lengths with `--wrapping geodesic`.
 
     ```xml
       <Body name="shank"> <mass>3</mass> <inertia>0.05 0.05 0.005 0 0 0</inertia>
@@ -92,17 +92,17 @@ JUMP = Threshold(
 def report_path_jump(subject: Subject, report: FindingCollector) -> None:
     """The length of a path jumps.
 
-    Reports paths whose length jumps by a millimetre or more at a value of a coordinate within its
-    range, with the others at their defaults: because a conditional point starts or stops acting, or
-    because OpenSim finds another route around a surface. Each path is reported once, with its
-    greatest jump. The rule checks nine values of each coordinate, the ends of the ranges of
-    conditional points, and intervals in which the length changes differently from the neighbouring
-    intervals.
+    Moves each coordinate through its range, with all other coordinates at their defaults. Reports a
+    path if its length jumps by a millimetre or more: a conditional point starts or stops acting, or
+    OpenSim finds another route around a surface. Each path is reported once, with its greatest
+    jump. The rule checks nine values of each coordinate and the ends of the ranges of conditional
+    points. It searches further in intervals in which the length changes differently from the
+    neighbouring intervals.
 
-    The muscle force jumps there, and so do accelerations: integrators take ever smaller steps,
+    The muscle force jumps there, and so do accelerations. Integrators take ever smaller steps,
     optimisations have no derivative, and the fibers stretch suddenly by the jump. The moment arm
-    does not show it. A wrap surface, or a moving point, in place of the conditional point makes the
-    length continuous.
+    does not show the jump. To make the length continuous, replace a conditional point by a wrap
+    surface or a moving point.
 
     ```xml
       <ConditionalPathPoint name="via">
@@ -130,14 +130,13 @@ def report_path_jump(subject: Subject, report: FindingCollector) -> None:
 def report_length_of_wrap(subject: Subject, report: FindingCollector) -> None:
     """OpenSim computes a negative path length on a surface, or finds no path.
 
-    Reports wraps where OpenSim subtracts the path length on the surface instead of adding it, which
-    happens on the far side of a sphere whose `quadrant` is not `all`; and wraps for which it finds
-    no tangent points, so the path goes straight through the surface, which happens where the line
-    between the points goes through the centre of a sphere. The rule checks the default pose and
-    nine values of each coordinate over its range.
+    Reports two faults of OpenSim in the default pose and at nine values of each coordinate over its
+    range. On the far side of a sphere whose `quadrant` is not `all`, OpenSim subtracts the path
+    length on the surface instead of adding it. If the line between two points goes through the
+    centre of a sphere, OpenSim finds no tangent points: the path goes straight through the surface.
 
-    The path is too short, by centimetres and perhaps below zero; forces and moment arms are wrong.
-    Where a path goes through the centre of a sphere its length jumps.
+    The path is too short by centimetres, and its length may even be negative: forces and moment
+    arms are wrong. If a path goes through the centre of a sphere, its length jumps there.
 
     ```xml
       <PathPoint name="band_a"> <location>-0.039 -0.18 0</location> </PathPoint>
@@ -186,16 +185,16 @@ def report_moving_point_range(subject: Subject, report: FindingCollector) -> Non
     """A moving path point is not defined over the range of its coordinate.
 
     Reports moving points whose functions end before the range of their coordinate, if extrapolation
-    moves the point by a millimetre or more from there to the end of the range. As an info it
-    reports points that would still move by 5 mm per radian or more at an end of the range, if
-    nothing keeps the coordinate within it: that is, if no CoordinateLimitForce acts on it and it is
-    neither locked nor prescribed.
+    moves the point by a millimetre or more up to the end of the range. As an info, the rule reports
+    points that still move by 5 mm per radian or more at an end of the range. It does so only if
+    nothing limits the coordinate: no CoordinateLimitForce acts on it, and it is neither locked nor
+    prescribed.
 
-    Beyond their ends OpenSim extrapolates functions: a spline by a straight line, a GCVSpline
-    roughly by a parabola, which soon leaves the bone. Outside the range of the coordinate OpenSim
-    keeps a moving point in place, while the speed of the path, its moment arm and its work are
-    computed as if the point moved: the length and its rate contradict each other, and energy is not
-    conserved. Nothing keeps a coordinate in its range in a simulation, not even `clamped`.
+    OpenSim extrapolates functions beyond their ends: a GCVSpline roughly by a parabola, other
+    splines by a straight line. The point soon leaves the bone. Outside the range of the coordinate,
+    OpenSim keeps a moving point in place. But it computes the speed of the path, the moment arm and
+    the work as if the point moved: they contradict the length, and energy is not conserved. In a
+    simulation nothing keeps a coordinate in its range, not even `clamped`.
 
     ```xml
       <MovingPathPoint name="patella">

@@ -27,12 +27,13 @@ _ALLOWING_FLAGS = ("allow_unused_references", "kinematics_allow_extra_columns")
 def report_impossible_bounds(setup: Setup, report: FindingCollector) -> None:
     """Bounds of a study are empty or contradict each other.
 
-    Compares both ends of all bounds, initial and final bounds with those of the whole phase, and
-    the start and end times of a phase. Reports a state or control that has bounds twice, bounds of
-    an angle that look like degrees, and bounds of a time that are empty.
+    Reports bounds whose first number is larger than the second, initial and final bounds outside
+    the bounds of the whole phase, and a phase that ends before it begins. Also reports a state or
+    control with two sets of bounds, bounds of an angle that seem to be in degrees, and a time with
+    empty bounds.
 
-    The optimizer fails with a message that names neither bounds nor variable. Of two sets of bounds
-    OpenSim uses the last, without a message.
+    The optimizer fails with a message that names neither the bounds nor the variable. If a variable
+    has two sets of bounds, OpenSim uses the last one, without a message.
 
     ```setup
       <MocoPhase name="phase">
@@ -133,9 +134,9 @@ _COUNTED = (
 def report_study_data(setup: Setup, report: FindingCollector) -> None:
     """A table that a study tracks, or uses as initial guess, does not fit its model.
 
-    Checks for missing table names, for motions without `inDegrees`, for times outside a table, for
-    columns that are not a state, control, generalized force or marker of the model, and for states
-    and controls that are missing in an initial guess.
+    Checks for missing table names, for motions without `inDegrees`, and for times outside a table.
+    Also checks for columns that are not a state, control, generalized force or marker of the model,
+    and for states and controls that are missing in an initial guess.
 
     OpenSim rejects the study.
 
@@ -299,10 +300,10 @@ def _find_unknown_columns(
 def report_study_parts(setup: Setup, report: FindingCollector) -> None:
     """A part of a study has a name or a target that OpenSim rejects.
 
-    Checks for goals, constraints and parameters without a name or with a duplicate name, for
-    parameters of properties that a component does not have or that are not numbers, for measured
-    forces that are not in the loads, and for models with locked coordinates or with joints whose
-    speeds are not the rates of their coordinates.
+    Checks for goals, constraints and parameters without a name or with a duplicate name. Also
+    checks for parameters of properties that a component does not have or that are not numbers, and
+    for goals that name a force that is not in the loads. Reports models with locked coordinates,
+    and models with joints whose speeds are not the rates of their coordinates.
 
     OpenSim rejects the study.
 

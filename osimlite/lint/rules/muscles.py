@@ -27,13 +27,14 @@ LONGEST = Threshold("longest-fiber", 2.0, "optimal lengths", "largest plausible 
 def report_doubtful_muscle(subject: Subject, report: FindingCollector) -> None:
     """The fibers of a muscle have an implausible length or angle.
 
-    Reports a pennation angle of a quarter turn or more, and a default fiber length, given in the
-    file, that is less than 0.2 or more than 2 optimal lengths. Numbers that OpenSim rejects are
-    reported as impossible values.
+    Reports a pennation angle of 90 degrees or more. Also reports a `default_fiber_length` in the
+    file that is less than 0.2 or more than 2 optimal fiber lengths. For numbers that OpenSim
+    rejects, see OSIM206.
 
-    Fibers perpendicular to the tendon pull nothing along it; often the angle is in degrees. A
-    muscle tears beyond twice its optimal length, and has no force below a fifth of it; the search
-    for equilibrium then starts far away, and often the numbers belong to two different muscles.
+    Fibers perpendicular to the tendon do not pull on it; often such an angle is in degrees. A
+    muscle tears beyond twice its optimal length, and has no force below a fifth of it. A default
+    length beyond these limits makes the search for equilibrium start far away. Often the two
+    lengths belong to different muscles.
 
     ```xml
       <Millard2012EquilibriumMuscle name="flexor">
@@ -78,8 +79,8 @@ def report_control_below_activation(subject: Subject, report: FindingCollector) 
     Reports Thelen and Millard muscles whose `min_control` is smaller than their
     `minimum_activation`.
 
-    OpenSim rejects the model. Activation never falls below its minimum, since the equations of the
-    muscle divide by it; a smaller control contradicts it.
+    OpenSim rejects the model. The activation must not fall below its minimum, since the equations
+    of the muscle divide by it. A smaller control would contradict this.
 
     ```xml
       <Millard2012EquilibriumMuscle name="flexor">
@@ -105,14 +106,14 @@ def report_control_below_activation(subject: Subject, report: FindingCollector) 
 def report_out_of_reach(subject: Subject, report: FindingCollector) -> None:
     """The path of a muscle requires an impossible fiber length.
 
-    Reports muscles whose path, in the default pose, is shorter than the slack tendon, or longer
-    than it by more than 2 optimal fiber lengths. Paths around surfaces count as straight, which is
-    their minimum length; paths through moving points, or through points whose position needs a
+    Reports muscles whose path in the default pose is shorter than `tendon_slack_length`, or exceeds
+    it by more than 2 optimal fiber lengths. Paths around surfaces count as straight, which is their
+    minimum length. Paths through moving points, or through points whose position needs a
     simulation, are not checked.
 
-    A slack muscle has no force, and fibers tear at twice their optimal length. OpenSim finds no
-    equilibrium of such muscles, or computes NaN; otherwise the forces are wrong. Often the lengths
-    belong to another muscle, or were not scaled with the bones.
+    If a path is too short, the tendon is slack and the muscle has no force. If a path is too long,
+    real fibers would tear. OpenSim finds no equilibrium of such a muscle, computes NaN, or computes
+    wrong forces. Often the lengths belong to another muscle, or were not scaled with the bones.
 
     ```xml
       <Millard2012EquilibriumMuscle name="flexor">
@@ -159,11 +160,12 @@ def report_shared_time_constants(subject: Subject, report: FindingCollector) -> 
 
     Reports each DeGrooteFregly2016Muscle whose `activation_time_constant`,
     `deactivation_time_constant` or `activation_dynamics_smoothing` differs from that of the first
-    such muscle in the model whose activation is a state.
+    such muscle. Only muscles whose activation is a state count.
 
-    OpenSim stores these three once per process: it uses those of the muscle that it computes first,
-    even if that belongs to a model loaded earlier. A muscle of 30 ms after one of 15 ms is
-    activated twice as fast as its file says. Muscles of other classes have separate values.
+    OpenSim stores these three numbers once per process. It uses the numbers of the muscle that it
+    computes first, even if that muscle belongs to a model loaded earlier. If the first muscle has
+    15 ms and this one 30 ms, this one is activated twice as fast as its file says. Muscles of other
+    classes have separate numbers.
 
     ```xml
       <DeGrooteFregly2016Muscle name="fast">

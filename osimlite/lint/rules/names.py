@@ -34,11 +34,11 @@ LEFT_OUT: tuple[NoteKind, ...] = (
 def report_duplicate_name(subject: Subject, report: FindingCollector) -> None:
     """Two sibling components have the same name.
 
-    Reports the second of two siblings with one name, with the name that OpenSim gives it and the
-    components that refer to it.
+    Reports the second of two components that have the same name and the same parent. The message
+    says which name OpenSim gives to the second, and which components refer to the name.
 
-    OpenSim renames the second by adding a number. All references to it lead to the first: both feet
-    then touch the ground with the same sphere.
+    OpenSim renames the second component by adding a number. All references to the name lead to the
+    first component: both feet then touch the ground with the same sphere.
 
     ```xml
       <MarkerSet>
@@ -75,10 +75,11 @@ def report_illegal_name(subject: Subject, report: FindingCollector) -> None:
 
     Reports white space, `/`, `\`, `*` and `+` in the names of components.
 
-    Names are the parts of paths; OpenSim rejects the file. In files older than version 30500 it
-    removes all white space from names, but only that at both ends from references. A reference to
-    'right asis' then finds nothing, because the component is now called 'rightasis'. OpenSim rejects
-    the file, unless only groups and controllers have such references.
+    Names are the parts of paths, which must not contain these characters: OpenSim rejects the file.
+    In files older than version 30500, OpenSim removes all white space from names. But from
+    references it removes only white space at both ends. A reference to 'right asis' then finds
+    nothing, because the component is now called 'rightasis'. OpenSim rejects the file, unless only
+    groups and controllers have such references.
 
     ```xml
     - <Marker name="right asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>

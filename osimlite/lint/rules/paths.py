@@ -131,8 +131,8 @@ def report_inverted_point_range(subject: Subject, report: FindingCollector) -> N
     """A conditional path point is never in the path.
 
     Reports conditional points whose range ends before it begins, or lies outside of the range of
-    the coordinate, and points without a range. Where both ends converted to radians would lie in
-    the range of the coordinate, the range is in degrees.
+    the coordinate, and points without a range. If both ends would lie in the range of the
+    coordinate after conversion to radians, the rule asks whether they are in degrees.
 
     The coordinate is never inside the range, so the path never uses the point.
 
@@ -219,7 +219,7 @@ def report_unused_wrap_object(subject: Subject, report: FindingCollector) -> Non
 
     Reports wrap objects that no path names.
 
-    They have no effect; often a path should use them.
+    Such a surface has no effect. Often a path should use it.
 
     ```xml
       <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
@@ -249,8 +249,8 @@ def report_moving_point_coordinates(subject: Subject, report: FindingCollector) 
 
     Reports moving path points whose x, y and z follow different coordinates.
 
-    OpenSim rejects the model. Such a point moves along a curve on the bone as one joint rotates, as
-    the patellar tendon does with the knee; two joints would need a surface.
+    OpenSim rejects the model. A moving point follows a curve on the bone as one joint rotates, as
+    the patellar tendon does at the knee. It cannot follow two joints.
 
     ```xml
       <MovingPathPoint name="patella">

@@ -48,11 +48,11 @@ UNLIMITED = Threshold(
 def report_strange_gravity(subject: Subject, report: FindingCollector) -> None:
     """Gravity is far from that of the Earth.
 
-    Reports gravity stronger than 30 m/s^2, which is usually one in millimetres, and gravity that
-    points up along Y.
+    Reports gravity stronger than 30 m/s^2, which is usually in mm/s^2, and gravity that points up
+    along Y.
 
-    OpenSim works in metres, kilograms and seconds, with Y up. Lengths in millimetres make a model
-    that falls a thousand times too fast.
+    OpenSim works in metres, kilograms and seconds, with Y up. With gravity in mm/s^2 a model falls
+    a thousand times too fast.
 
     ```xml
     - <gravity>0 -9806.65 0</gravity>
@@ -80,10 +80,11 @@ def report_friction_order(subject: Subject, report: FindingCollector) -> None:
 
     Reports contact materials whose static coefficient is below the dynamic one.
 
-    No material has more friction while sliding; usually the two numbers are swapped. Simbody's
-    friction rises with the speed v of sliding, measured in transition velocities, as min(v, 1) (d +
-    2 (s - d) / (1 + v^2)), with s static and d dynamic: where s is less than half of d this is
-    negative at small v, and friction accelerates the sliding.
+    No material has more friction while sliding than at rest; usually the two numbers are swapped.
+    Simbody computes the friction coefficient as min(v, 1) (d + 2 (s - d) / (1 + v^2)). Here s is
+    the static and d the dynamic coefficient, and v the sliding speed divided by the transition
+    velocity. If s is less than half of d, the result is negative at small v: friction then
+    accelerates the sliding.
 
     ```xml
       <HuntCrossleyForce::ContactParameters>
@@ -116,7 +117,7 @@ def report_limits_swapped(subject: Subject, report: FindingCollector) -> None:
 
     Reports limit forces whose upper limit is smaller than the lower one.
 
-    Between the two limits both springs act against each other, in every pose that should be free.
+    Between the two limits no force should act. But both springs act there, against each other.
 
     ```xml
       <CoordinateLimitForce name="stop">
@@ -142,7 +143,7 @@ def report_limit_outside_range(subject: Subject, report: FindingCollector) -> No
 
     Reports limits that lie outside the range of the coordinate by more than the transition.
 
-    A range does not stop the motion; only the limit force does. The model can then move beyond the
+    A range does not stop the motion. Only the limit force does, so the model can move beyond its
     range. Note that limits are in degrees and ranges in radians.
 
     ```xml
@@ -175,11 +176,13 @@ def report_limit_outside_range(subject: Subject, report: FindingCollector) -> No
 def report_limit_inside_range(subject: Subject, report: FindingCollector) -> None:
     """A limit force begins well inside the range of its coordinate.
 
-    Reports limits inside the range of the coordinate by more than the transition and a quarter of
-    the range. It is a warning if the default value of the coordinate is already beyond the limit.
+    Reports limits inside the range of the coordinate by more than the transition and by more than a
+    quarter of the range. The finding is a warning if the default value of the coordinate is already
+    beyond the limit.
 
-    Part of the range can only be reached against the spring. If the default pose is past the limit,
-    the force acts from the start. Note that limits are in degrees and ranges in radians.
+    The model can reach a part of the range only against the spring of the limit force. If the
+    default pose is beyond the limit, the force acts from the start. Note that limits are in degrees
+    and ranges in radians.
 
     ```xml
       <CoordinateLimitForce name="stop">

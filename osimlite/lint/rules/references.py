@@ -29,12 +29,13 @@ if TYPE_CHECKING:
 def report_unresolved_reference(subject: Subject, report: FindingCollector) -> None:
     """A component names another component that does not exist.
 
-    Follows every reference by OpenSim's own rule for that property and reports unresolved
-    references, with the force, joint or other component that contains them and the nearest existing
-    name.
+    Resolves every reference as OpenSim does for that property. Reports references that lead to no
+    component, with the force, joint or other component that contains them, and suggests the nearest
+    existing name.
 
-    OpenSim rejects the model when it connects the components. Its message does not name the line
-    and, for a contact, not the force. A group loses a missing member without a message.
+    OpenSim rejects the model when it connects the components. Its message does not name the line.
+    For contact geometry, the message does not even name the force. If a group names a missing
+    member, OpenSim leaves the member out without a message.
 
     ```xml
       <HuntCrossleyForce::ContactParameters>
@@ -67,8 +68,8 @@ def report_unresolved_reference(subject: Subject, report: FindingCollector) -> N
 def report_reference_to_wrong_type(subject: Subject, report: FindingCollector) -> None:
     """A reference leads to a component of a class that the property cannot use.
 
-    Reports references to an existing component of another class: a joint as the parent frame, a
-    body where a contact geometry belongs.
+    Reports references to an existing component of another class, such as a joint in place of a
+    parent frame, or a body in place of a contact geometry.
 
     OpenSim says that the component does not exist, and rejects the model.
 
@@ -137,12 +138,12 @@ def report_reference_form(subject: Subject, report: FindingCollector) -> None:
     """A reference has the wrong form: a path instead of a name, or a name instead of a path.
 
     Reports references that would be correct in another form: a bare name in a socket, a path
-    without its leading slash, a path where OpenSim expects a bare name, or a path without the sets
-    as in files before version 4.
+    without its leading slash, or a path where OpenSim expects a bare name. Also reports paths
+    without the sets, as in files before version 4.
 
-    OpenSim does not search. A bare name in a socket means a child of the component; a path in
-    `<coordinate>` of a limit force means a coordinate with slashes in its name. It rejects the
-    model.
+    OpenSim does not search for the component that is meant. It takes a bare name in a socket for a
+    child of the component itself. It takes a path in `<coordinate>` of a limit force for the name
+    of a coordinate. It finds neither, and rejects the model.
 
     ```xml
     - <Marker name="asis"> <socket_parent_frame>pelvis</socket_parent_frame> </Marker>
@@ -202,9 +203,9 @@ def _is_repeated(source: Source, number: int) -> bool:
 def report_reference_case(subject: Subject, report: FindingCollector) -> None:
     """A reference differs from a name in letter case only.
 
-    Reports references that match a component if letter case is ignored.
+    Reports references that match a component only if letter case is ignored.
 
-    Names are compared exactly; OpenSim rejects the model.
+    OpenSim compares names exactly, and rejects the model.
 
     ```xml
     - <Marker name="asis"> <socket_parent_frame>/bodyset/Pelvis</socket_parent_frame> </Marker>

@@ -34,10 +34,10 @@ from osimlite.schema.tree import is_a
 def report_contradicting_values(subject: Subject, report: FindingCollector) -> None:
     """Numbers of one object contradict each other.
 
-    Reports curves of muscles whose numbers do not define a curve, settings that a class of muscles
-    does not support (`ignore_tendon_compliance` of a Thelen2003Muscle, a `minimum_activation` of 1,
-    `optimal_force` beside `max_isometric_force`), a torus without a hole, and a path given by
-    functions that do not take its coordinates.
+    Reports curves of muscles whose numbers do not define a curve, a torus without a hole, and a
+    FunctionBasedPath whose functions do not take its coordinates. Also reports settings that a
+    class of muscles does not support. These are `ignore_tendon_compliance` of a Thelen2003Muscle, a
+    `minimum_activation` of 1, and `optimal_force` beside `max_isometric_force`.
 
     OpenSim rejects the model, and its message names neither the muscle nor the property.
 
@@ -78,8 +78,9 @@ def report_controls_swapped(subject: Subject, report: FindingCollector) -> None:
 
     Reports actuators and muscles whose `min_control` is larger than their `max_control`.
 
-    No control is allowed. OpenSim simulates the model anyway; static optimization, computed muscle
-    control and optimal control use them as bounds and fail.
+    No number lies between the two, so no control is allowed. OpenSim simulates the model anyway.
+    But static optimization, computed muscle control and optimal control use both numbers as bounds,
+    and fail.
 
     ```xml
       <CoordinateActuator name="motor">

@@ -21,11 +21,11 @@ def report_missing_column(setup: Setup, report: FindingCollector) -> None:
     Compares the columns of a table of coordinates with the coordinates of the model. OpenSim's
     inverse dynamics accepts plain names only, such as `knee_angle`. Its analyses also accept paths
     such as `/jointset/knee/knee_angle/value`, and `osimlite run` accepts paths of every version. A
-    task whose value comes from a file needs a column there, and a table of states needs one for
-    every state of the model.
+    coordinate task that takes its values from a file needs a column in that file. A table of states
+    needs a column for every state of the model.
 
-    OpenSim gives a coordinate without a column its default value, in analyses 0, without a message
-    or with a line in the log: the motion is wrong.
+    If a coordinate has no column, OpenSim uses its default value, or 0 in analyses. OpenSim logs a
+    line at most, and the motion is wrong.
 
     ```setup
       <InverseDynamicsTool name="id">

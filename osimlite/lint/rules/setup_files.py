@@ -39,9 +39,9 @@ def report_missing_input(setup: Setup, report: FindingCollector) -> None:
     project writes need not exist yet. Reports names in the wrong letter case and names with
     backslashes, which only Windows accepts, and suggests a file with a similar name.
 
-    OpenSim rejects the setup; where the model is missing, inverse kinematics crashes. A missing
-    file of controls is only logged, and the tool runs without controls. A setup that names no file
-    is a warning: a program may supply one.
+    OpenSim rejects the setup. If the model is missing, inverse kinematics crashes. If a file of
+    controls is missing, OpenSim only logs this, and the tool runs without controls. A setup that
+    names no file is a warning, because a program may supply the file.
 
     ```setup
       <InverseDynamicsTool name="id">
@@ -168,8 +168,8 @@ _MIN_FILE_SIMILARITY = 75.0
 def report_input_of_another_kind(setup: Setup, report: FindingCollector) -> None:
     """A file that a setup reads has the wrong content.
 
-    Compares the suffix of a table, and the class at the top of a document, with the property: a
-    ForceSet is not ExternalLoads.
+    Checks whether each file has the content that its property expects. A table is recognised by its
+    suffix, a document by the class at its top. For example, a ForceSet is not ExternalLoads.
 
     OpenSim rejects the file.
 
@@ -213,10 +213,10 @@ def report_input_of_another_kind(setup: Setup, report: FindingCollector) -> None
 def report_lost_output(setup: Setup, report: FindingCollector) -> None:
     """Results would be lost or written elsewhere.
 
-    Checks the folder for results (OpenSim creates only its last part), missing folders of
-    output files, and output files without a name.
+    Checks for a results folder that OpenSim cannot create (it creates only the last folder of a
+    path). Also checks for output files in missing folders, and for output files without a name.
 
-    The tool runs to its end and its results are lost, with a line in the log at most.
+    The tool runs to its end, and its results are lost. OpenSim logs a line at most.
 
     ```setup
       <InverseDynamicsTool name="id">
@@ -299,8 +299,9 @@ def report_lost_output(setup: Setup, report: FindingCollector) -> None:
 def report_tools_differ(setup: Setup, report: FindingCollector) -> None:
     """A tool ignores loads or a filter that another tool applies to the same motion.
 
-    Compares a tool with all others in its folder that read the same file of coordinates: whether
-    they apply measured loads, and whether they filter the motion.
+    Compares a tool with all other tools in its folder that read the same file of coordinates.
+    Reports a difference if only one of them applies measured loads, or if only one of them filters
+    the motion.
 
     Joint moments without ground reactions, or muscle forces from an unfiltered motion, look like
     valid results, but do not match those of the other tool.

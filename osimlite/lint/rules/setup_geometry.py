@@ -36,12 +36,13 @@ _SIDES = (("R", "L"), ("r", "l"), ("Right", "Left"), ("right", "left"), ("RIGHT"
 def report_scale_factor(setup: Setup, report: FindingCollector) -> None:
     """A body would be scaled by an implausible factor.
 
-    Checks for manual scale factors, and for measurements, that make a body less than half or more
-    than twice as large. A measurement is the distance of its markers in the data over that in the
-    model, in its default pose.
+    Reports manual scale factors, and measurements, that make a body less than half or more than
+    twice as large. The factor of a measurement is the distance of its markers in the data, divided
+    by their distance in the default pose of the model.
 
-    A marker with the wrong label, wrong units in the header, or a pair of markers whose distance
-    depends on the pose give a model that does not fit the person; OpenSim gives no message.
+    The scaled model does not fit the person, and OpenSim gives no message. Typical causes are a
+    marker with the wrong label, wrong units in the header, and a pair of markers whose distance
+    depends on the pose.
 
     ```setup
       <ScaleSet name="factors">
@@ -109,13 +110,13 @@ def report_scale_factor(setup: Setup, report: FindingCollector) -> None:
 def report_swapped_sides(setup: Setup, report: FindingCollector) -> None:
     """A right and a left marker are swapped in the data.
 
-    Compares, for each pair of markers whose names differ only in the side, the direction from left
-    to right with that of all other such pairs, in the data and in the model. Reports a pair that is
-    reversed in four of five rows. Pairs more than half a metre apart in the model are ignored: arms
-    may be crossed. Only rows within the time range of the tool count, and a marker at 0 0 0 counts
-    as missing.
+    Checks each pair of markers whose names differ only in the side, such as R.ASIS and L.ASIS.
+    Compares the direction from the left to the right marker with that of all other pairs, in the
+    data and in the model. Reports a pair whose direction is reversed in at least four of five rows.
+    Pairs more than half a metre apart in the model are ignored, because arms may be crossed. Only
+    rows within the time range of the tool count, and a marker at 0 0 0 counts as missing.
 
-    Inverse kinematics twists legs and pelvis to fit the markers; the errors that it reports are
+    Inverse kinematics twists legs and pelvis to fit the markers. The errors that it reports are
     spread over all markers.
 
     ```setup

@@ -29,13 +29,13 @@ docs/public-projects.md that measure gaits, the largest distance from the origin
 def report_load_columns(setup: Setup, report: FindingCollector) -> None:
     """The columns of a measured force are not in the data.
 
-    Checks the columns whose labels begin with the identifiers of an external force: there must be
-    three for each. Reports a force without a point (it acts at the origin of the body), columns
-    that are not in the order x, y, z (OpenSim reads them in the order of the file), and forces
-    without an identifier.
+    Searches the data for the columns of each external force. For each identifier, the data must
+    have exactly three columns whose labels begin with it. Also reports a force without a point (it
+    acts at the origin of the body), and a force without an identifier. Also reports columns that
+    are not in the order x, y, z, because OpenSim reads them in the order of the file.
 
-    OpenSim rejects loads without three matching columns, and swaps the axes of columns in another
-    order without a message.
+    If there are not three matching columns, OpenSim rejects the loads. If the columns are in
+    another order, it swaps the axes without a message.
 
     ```setup
       <ExternalLoads name="loads">
@@ -133,18 +133,18 @@ def report_load_columns(setup: Setup, report: FindingCollector) -> None:
 def report_load_place(setup: Setup, report: FindingCollector) -> None:
     """A measured force acts far away from its body, or is expressed in the wrong frame.
 
-    Poses the model along the motion of the tool, and reports measured forces that act more than
-    40 cm from their body: from its origin, mass centre, joints, markers and contact surfaces. Every
-    point of a foot or a hand is nearer, even if foot and shank are one body. For a force that is
-    expressed in a body, the rule also reads its numbers as components in ground. If the force then
-    points more upwards, it is reported. A torque is reported if it is larger than the moment of the
-    force at a distance of 40 cm. The sum of all forces must point up if it is at least half the
-    weight of the model.
+    Poses the model along the motion of the tool. Reports measured forces that act more than 40 cm
+    from all of these points of their body: its origin, mass centre, joints, markers and contact
+    surfaces. No point of a foot or a hand is so far away, even if foot and shank are one body. For
+    a force that is expressed in a body, the rule also reads its numbers as components in ground. If
+    the force then points more upwards, it is reported. A torque is reported if it is larger than
+    the moment of the force at a distance of 40 cm. The sum of all forces must point up if it is at
+    least half the weight of the model.
 
-    OpenSim applies the force where the setup says: joint moments are wrong by the force times that
-    distance, without a message. Typical causes are swapped feet, points in millimetres, torques in
-    newton millimetres, laboratory axes instead of model axes, forces on the ground instead of on
-    the foot, and loads of another trial.
+    OpenSim applies the force where the setup says, without a message. If the place is wrong, joint
+    moments are wrong by the force times the distance. Typical causes are swapped feet, points in
+    millimetres, torques in newton millimetres, and laboratory axes instead of model axes. Others
+    are forces on the ground instead of on the foot, and loads of another trial.
 
     ```setup
       <ExternalLoads name="loads">

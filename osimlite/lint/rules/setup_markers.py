@@ -28,14 +28,14 @@ def find_marker_users(setup: Setup) -> Iterator[tuple[Any, Table]]:
 def report_marker_not_measured(setup: Setup, report: FindingCollector) -> None:
     """A marker that a tool fits is not in the data.
 
-    Looks up each marker of the tasks, and of the pairs that measure lengths, among the labels of
-    the data. Markers of pairs must also be visible in every row over which a length is averaged. It
-    is an error if no marker is in both model and data.
-    Also checks whether the markers are enough to determine the coordinates of the model.
+    Checks whether the data have each marker of the tasks, and of the pairs that measure lengths.
+    Both markers of a pair must also be visible in every row over which the tool averages the
+    length. The finding is an error if no marker is in both model and data. Also checks whether the
+    markers are enough to determine the coordinates of the model.
 
-    OpenSim ignores the marker without a message; with no common marker it crashes. It ignores a
-    measurement with a marker that is missing in one row: its bodies keep their size. Coordinates
-    that too few markers determine stay constant, or drift.
+    OpenSim ignores a missing marker without a message, and crashes if model and data have no marker
+    in common. If a marker of a measurement is missing in one row, OpenSim ignores the measurement:
+    its bodies keep their size. Coordinates that too few markers determine stay constant, or drift.
 
     ```setup
       <InverseKinematicsTool name="ik">

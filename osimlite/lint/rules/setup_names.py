@@ -34,13 +34,13 @@ def report_unknown_name(setup: Setup, report: FindingCollector) -> None:
     """A setup refers to something that the model of its tool does not have.
 
     Checks whether the model of the tool has every marker, coordinate, body, joint, muscle and
-    actuator that the setup names, or that a set names which the setup reads. Forces and markers
-    that the tool adds to the model count, too. In Moco studies the rule also checks states,
-    controls and outputs, which paths or patterns name.
+    actuator that the setup names. Names in set files that the setup reads are checked, too. Forces
+    and markers that the tool adds count as parts of the model. In Moco studies the rule also checks
+    states, controls and outputs, which paths or patterns name.
 
-    Most tools reject the setup, some crash. Missing markers of tasks, bodies of scale factors and
-    muscles of an analysis are ignored without a message, and so are patterns without a match
-    (warnings).
+    Most tools reject the setup, some crash. OpenSim ignores missing markers of tasks, bodies of
+    scale factors and muscles of an analysis without a message (warnings). It also ignores patterns
+    without a match (a warning).
 
     ```setup
       <AnalyzeTool name="analyze">
@@ -255,9 +255,9 @@ def _is_made_by_operators(setup: Setup, text: str) -> bool:
 def report_excluded_force(setup: Setup, report: FindingCollector) -> None:
     """Inverse dynamics excludes a force that does not exist.
 
-    Compares `forces_to_exclude` with the words OpenSim knows (ALL, ACTUATORS, MUSCLES), the groups
-    of the model's forces, and, if there is no group, with the names of the forces: in a model with
-    groups OpenSim looks at groups only. An empty list is reported if the model has muscles.
+    Checks whether OpenSim finds each entry of `forces_to_exclude`. An entry is a word that OpenSim
+    knows (ALL, ACTUATORS, MUSCLES) or the name of a group of forces. Names of single forces count
+    only in a model without groups. An empty list is reported if the model has muscles.
 
     The force still acts. If muscles act, their passive forces produce a part of the joint moments,
     and the tool writes only the rest.

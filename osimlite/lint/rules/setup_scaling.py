@@ -93,8 +93,8 @@ def report_scale_setting(setup: Setup, report: FindingCollector) -> None:
 
     Checks the mass, the order of scaling, measurements, axes, skipped steps, and averaged times.
 
-    A measurement with one marker makes OpenSim crash. It ignores unknown words in `axes` without a
-    message, and the body keeps its size.
+    A measurement with one marker makes OpenSim crash. OpenSim ignores unknown words in `axes`
+    without a message, and the body keeps its size.
     """
     for tool in setup.find_by_class("ScaleTool"):
         scaler = tool.model_scaler

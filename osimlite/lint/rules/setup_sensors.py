@@ -31,8 +31,8 @@ def report_sensor_without_frame(setup: Setup, report: FindingCollector) -> None:
     suffix `_imu`. Also checks whether the table has a column for each sensor that the tool names.
     The table must contain quaternions.
 
-    OpenSim ignores sensors without a frame, and only logs the number of the others; if none is
-    left, it rejects the table.
+    OpenSim ignores sensors without a frame; its log says only how many sensors it uses. If no
+    sensor has a frame, OpenSim rejects the table.
 
     ```setup
       <IMUPlacer name="placer">

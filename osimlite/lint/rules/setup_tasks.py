@@ -19,11 +19,11 @@ def report_task_weight(setup: Setup, report: FindingCollector) -> None:
     """The weights of tasks are invalid.
 
     Checks for negative weights, for tasks without weight (the default is 0), for markers and
-    coordinates with two tasks, and for sets in which no task applies.
+    coordinates with two tasks, and for sets in which all tasks are disabled.
 
-    OpenSim rejects negative weights. A task without weight is not tracked, but counted in the
-    error; an explicit weight of 0 may be intended, and is an info. If no task applies, all markers
-    have equal weight.
+    OpenSim rejects negative weights. It does not track a task without weight, but counts it in the
+    reported error. An explicit weight of 0 may be intended, and is an info. If all tasks are
+    disabled, all markers have equal weight.
 
     ```setup
       <IKTaskSet name="tasks">
@@ -89,11 +89,11 @@ def report_task_weight(setup: Setup, report: FindingCollector) -> None:
 def report_unreachable_task(setup: Setup, report: FindingCollector) -> None:
     """A coordinate of a task cannot move, or cannot reach its value.
 
-    Checks for tasks of locked coordinates, for tasks with most values outside the range of a
-    clamped coordinate, and for locked coordinates that move in the file of values.
+    Checks for tasks of locked coordinates, and for tasks whose values are mostly outside the range
+    of a clamped coordinate. Also checks for locked coordinates that move in the file of values.
 
-    Inverse kinematics keeps a locked coordinate at its default, and a clamped one in its range,
-    without a message: knees stay straight, and other joints bend instead.
+    Inverse kinematics keeps a locked coordinate at its default value, and a clamped one in its
+    range, without a message. Knees stay straight, for example, and other joints bend instead.
 
     ```setup
       <InverseKinematicsTool name="ik">

@@ -87,12 +87,11 @@ def report_time_outside_data(setup: Setup, report: FindingCollector) -> None:
     """The time range of a tool is invalid or outside its data.
 
     Compares the times of a tool with those of the tables that it reads: markers, coordinates,
-    sensors. Computed muscle control needs 0.03 s plus one window.
+    sensors. Computed muscle control needs at least 0.03 s plus its time window (`cmc_time_window`).
 
     Inverse kinematics cuts the times to the data without a message. Without a time range it stops
-    at 2 s: OpenSim 4.6 intends to use all data, but does not. Loads that end before the motion are
-    extrapolated by their spline. With times in the wrong order, or completely outside the data (an
-    error), the tools fail or crash.
+    at 2 s: OpenSim 4.6 intends to use all data, but does not. If times are in the wrong order, or
+    completely outside the data, the tools fail or crash (an error).
     """
     for item in setup.find_having("time_range"):
         count = len(item.time_range)
@@ -298,8 +297,8 @@ def report_loads_end_early(setup: Setup, report: FindingCollector) -> None:
     Compares the times of the data of external loads with those of the tool, or of the motion that
     the tool reads.
 
-    Before the first and after the last row OpenSim extrapolates linearly without a message: forces
-    grow to thousands of newtons.
+    Before the first and after the last row, OpenSim extrapolates the loads linearly, without a
+    message. Forces grow to thousands of newtons.
 
     ```setup
       <InverseDynamicsTool name="id">
@@ -348,8 +347,8 @@ def report_filter_frequency(setup: Setup, report: FindingCollector) -> None:
 
     Compares the cut-off frequency with half the sampling rate, and reports a cut-off of 0.
 
-    A filter above half the sampling rate is impossible: OpenSim uses another one. With 0, nothing
-    is left of the motion.
+    A cut-off above half the sampling rate is impossible, and OpenSim uses another one. A cut-off of
+    0 removes the whole motion.
 
     ```setup
       <InverseDynamicsTool name="id">
@@ -384,7 +383,8 @@ def report_motion_in_degrees(setup: Setup, report: FindingCollector) -> None:
     reaches. With `inDegrees=yes`, reports a motion of many joints in which no angle is larger than 3
     degrees.
 
-    Joint moments become hundreds of thousands of newton metres, without a message.
+    OpenSim gives no message. If it reads degrees as radians, joint moments become hundreds of
+    thousands of newton metres.
 
     ```setup
       <InverseDynamicsTool name="id">

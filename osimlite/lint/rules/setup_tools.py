@@ -186,7 +186,8 @@ def report_tool_setting(setup: Setup, report: FindingCollector) -> None:
     Checks accuracies and tolerances, steps, analyses, excluded or replaced forces, and disabled
     parts.
 
-    Some make OpenSim crash or run forever, some give wrong results without a message.
+    Some of these settings make OpenSim crash or run forever. Others give wrong results without a
+    message.
     """
     # 1. Settings that one comparison decides.
     for fault, of_class, tag, is_wrong, message in _SETTINGS:

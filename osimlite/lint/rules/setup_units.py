@@ -34,12 +34,13 @@ _WEIGHT_RANGE = 0.2, 10.0
 def report_marker_size(setup: Setup, report: FindingCollector) -> None:
     """The measured markers have a different spread from those of the model.
 
-    Compares the box around the markers of a frame, in the units that the file declares, with the
-    box around the same markers of the model in its default pose. If these differ by more than a
-    factor of three, and in other units they would not, the rule suggests these units.
+    Compares the size of the box around the markers of a frame with that of the same markers of the
+    model in its default pose. The data are read in the units that the file declares. If the sizes
+    differ by more than a factor of three, but would agree in other units, the rule suggests those
+    units.
 
-    OpenSim reads centimetres that are declared as millimetres without a message: inverse kinematics
-    ends with errors of decimetres, and a scaled model has a tenth of the size.
+    OpenSim uses the declared units without a message. If centimetres are declared as millimetres,
+    inverse kinematics ends with errors of decimetres, and a scaled model has a tenth of the size.
 
     ```setup
       <InverseKinematicsTool name="ik">
@@ -108,7 +109,7 @@ def report_load_units(setup: Setup, report: FindingCollector) -> None:
 
     Adds up the sizes of all measured forces in each row, and compares the largest sum with the
     weight of the model. Reports the loads if the sum is less than 2 % of the weight, and a thousand
-    times as much would be plausible for ground reactions.
+    times the sum would be plausible for ground reactions.
 
     OpenSim reads all forces in newtons, whatever the header of the file says: the residual forces
     of inverse dynamics then equal the whole weight.
@@ -171,9 +172,9 @@ def _find_largest_load(forces: Sequence[Any], table: Table) -> float:
 def report_ground_twice(setup: Setup, report: FindingCollector) -> None:
     """A contact force of the model and a measured load act on the same body.
 
-    Reports a body on which a measured force acts, and also a contact force of the model: one between
-    a surface of the body and a surface that is fixed to ground. Contact forces that the tool
-    excludes do not count.
+    Reports a body on which both a measured force and a contact force of the model act. The contact
+    force counts if it is between a surface of the body and a surface that is fixed to ground.
+    Contact forces that the tool excludes do not count.
 
     OpenSim applies both: the ground reaction counts twice, and the residual forces are as large as
     the weight. Exclude the contact forces with `forces_to_exclude`, or disable them in the model.

@@ -40,9 +40,9 @@ POINTS = ("socket_point_a", "socket_point_b", "socket_point_c", "socket_origin_p
 def report_degenerate_frame(subject: Subject, report: FindingCollector) -> None:
     """The points of a frame do not define a frame.
 
-    Reports StationDefinedFrames with two of the three stations that define the axes at the same
-    location, or with stations on different bodies; and offset frames that are fixed to themselves,
-    or to each other in a cycle.
+    Reports StationDefinedFrames in which two of the three stations that define the axes coincide,
+    or in which stations are on different bodies. Also reports offset frames that are fixed to
+    themselves, or to each other in a cycle.
 
     OpenSim rejects the model. It hangs if a joint refers to one of several frames in a cycle.
 
@@ -180,10 +180,11 @@ LENGTH = Threshold("largest-length", 10.0, "m", "largest plausible length on a b
 def report_starts_in_contact(subject: Subject, report: FindingCollector) -> None:
     """Contact surfaces are inside each other in the default pose.
 
-    Poses the model at its defaults and reports spheres that start inside a half-space or another
-    sphere of their contact force, by more than 1 mm and a tenth of the radius. It is a warning if
-    the centre of the sphere is inside. Only bodies on joints of plain rotations and translations,
-    or on custom joints without a GCVSpline, are checked. Meshes and other shapes are not.
+    Computes the default pose. Reports spheres that start inside a half-space or another sphere of
+    their contact force, by more than 1 mm and by more than a tenth of the radius. The finding is a
+    warning if the centre of the sphere is inside. Only bodies on joints of plain rotations and
+    translations, or on custom joints without a GCVSpline, are checked. Meshes and other shapes are
+    not.
 
     The contact acts with full force from the start: the model is thrown up, and the integrator
     takes tiny steps. Often the position of the floor or a default value is wrong.
@@ -231,11 +232,11 @@ def report_starts_in_contact(subject: Subject, report: FindingCollector) -> None
 def report_lengths_in_millimetres(subject: Subject, report: FindingCollector) -> None:
     """A length on a body is longer than ten metres.
 
-    Reports lengths and positions in the frame of a body beyond 10 m. Objects fixed to ground may be
-    far away, and prescribed or infinite values are not checked.
+    Reports lengths, and positions in the frame of a body, of more than 10 m. Objects fixed to
+    ground may be far away, and prescribed or infinite values are not checked.
 
-    OpenSim works in metres. A position in millimetres is a thousand times too far away, and so is
-    the lever arm.
+    OpenSim works in metres. A position in millimetres becomes a thousand times too far away, and so
+    does the lever arm.
 
     ```xml
       <Marker name="asis">

@@ -36,10 +36,11 @@ def report_unknown_tag(subject: Subject, report: FindingCollector) -> None:
     OpenSim ignores such an element without a message and keeps the default. With a misspelt
     `<stiffness>` a contact stiffness is 0, and the motion becomes NaN; with a misspelt `<ForceSet>`
     a model has no forces. Harmless elements are a warning: a misspelt element with the default
-    value, a property of an older version in a setup, and an element that OpenSim ignores in files
-    of every version, such as the `<location>` of a MovingPathPoint. A `<Comment>` is an info, and
-    so is an element in a setup that is empty or disables something that is disabled anyway. Of
-    several elements with the same tag only the first is reported, with the number of the others.
+    value, and a property of an older version in a setup. An element that OpenSim ignores in files
+    of every version, such as the `<location>` of a MovingPathPoint, is a warning, too. A
+    `<Comment>` is an info. An element in a setup is also an info if it is empty, or disables
+    something that is disabled anyway. If several elements have the same tag, only the first is
+    reported, with the number of the others.
 
     ```xml
       <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
@@ -232,8 +233,8 @@ def report_duplicate_tag(subject: Subject, report: FindingCollector) -> None:
 
     Reports every element after the first of the same property in one object.
 
-    OpenSim uses the first and ignores the rest, while readers expect the last one to count. A
-    repetition with the same content is a warning.
+    OpenSim uses the first element and ignores the others, while a person who reads the file may
+    expect the last one to count. A repetition with the same content is a warning.
 
     ```xml
     - <Body name="thigh"> <mass>8</mass> <mass>9</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
@@ -271,9 +272,10 @@ def report_duplicate_tag(subject: Subject, report: FindingCollector) -> None:
 def report_element_in_value(subject: Subject, report: FindingCollector) -> None:
     """A value contains an element.
 
-    Reports elements inside a number, a switch, a text or a reference, and comments, processing
-    instructions and CDATA sections in the middle of one. A comment before or after it is harmless.
-    A CDATA section must contain the whole value, without white space around a name or a number.
+    Reports elements inside a number, a switch, a text or a reference. Also reports comments,
+    processing instructions and CDATA sections in the middle of such a value. A comment before or
+    after the value is harmless. A CDATA section must contain the whole value, without white space
+    around a name or a number.
 
     OpenSim rejects the file.
 

@@ -21,10 +21,10 @@ _TO_THE_END = 1_000_000
 def report_table_header(table: Table, report: FindingCollector) -> None:
     """The header of a table is invalid.
 
-    Checks the line `endheader` of a storage file, in lower case, and `nRows` and `nColumns` where
-    the older reader reads the file (version 1 or none). A marker file must start with
-    `PathFileType`, without a byte-order mark, and have all eight keys in its second line in order,
-    each with a value.
+    Checks the line `endheader` of a storage file, which must be in lower case. Checks `nRows` and
+    `nColumns` if OpenSim's older reader reads the file (version 1 or none). A marker file must
+    start with `PathFileType`, without a byte-order mark. All eight keys must be in its second line
+    in order, each with a value.
 
     OpenSim rejects the file; for a storage file its message says only that an index is out of
     bounds.
@@ -199,10 +199,10 @@ def report_table_count(table: Table, report: FindingCollector) -> None:
     Compares `nRows` and `nColumns`, or `NumFrames` and `NumMarkers`, with the actual rows and
     labels.
 
-    From a storage file of version 1 OpenSim reads as many rows as `nRows` says, and takes the next
+    From a storage file of version 1, OpenSim reads as many rows as `nRows` says. It takes the next
     `nColumns` numbers as a row, even if they stand on two lines. It rejects a marker file whose
-    number of labels is not `NumMarkers`.
-    Where OpenSim ignores a count, it is a warning.
+    number of labels is not `NumMarkers`. If OpenSim ignores a wrong count, the finding is a
+    warning.
 
     ```sto
       knee
@@ -272,9 +272,9 @@ def report_table_count(table: Table, report: FindingCollector) -> None:
 def report_table_setting(table: Table, report: FindingCollector) -> None:
     """A setting in the header of a table has an unknown value.
 
-    Checks `inDegrees`, which is `yes` or `no`, the letter case of keys, `version`, `DataType`, and
-    in marker files `Units` (m, cm, mm) and `DataRate`, which is compared with the times (for
-    information).
+    Checks `inDegrees`, which must be `yes` or `no`, the letter case of keys, `version` and
+    `DataType`. In marker files, checks `Units` (m, cm, mm) and `DataRate`. A `DataRate` that does
+    not fit the times is an info.
 
     OpenSim reads `inDegrees=true` as no: it takes the angles as radians without a message. It
     rejects a file with unknown units.

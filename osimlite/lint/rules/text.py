@@ -42,9 +42,9 @@ def report_syntax_error(subject: Subject, report: FindingCollector) -> None:
     Reports where the XML parser stops: a tag that is not closed, a stray `<` or `&`, a truncated
     file.
 
-    OpenSim cannot load the file. The tags and values before the error are still checked; the rest
-    is not, since it is unknown which element it belongs to, and references are not, since they may
-    lead there.
+    OpenSim cannot load the file. osimlite still checks the tags and values before the error. It
+    cannot check the rest, because nobody knows to which element the rest belongs. It also checks no
+    references, because they may lead into the rest.
 
     ```xml
     - <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>
@@ -78,11 +78,11 @@ def report_unused_ignore(subject: Subject, report: FindingCollector) -> None:
     """A comment ignores a finding that does not exist.
 
     Reports `<!-- osimlite: ignore CODE -->` for each code without a finding in its scope. The scope
-    of such a comment is its line; alone on a line, the element that follows; before the root
-    element, the whole file. A line `osimlite: ignore CODE` in the header of a table applies to the
-    whole table.
+    of such a comment is its line. If the comment is alone on its line, the scope is the element
+    that follows. Before the root element, the scope is the whole file. In a table, a line
+    `osimlite: ignore CODE` in the header applies to the whole table.
 
-    The problem was fixed and the comment remained; it would hide the next problem.
+    Usually the problem was fixed, but the comment remained. It would hide the next problem.
 
     ```xml
       <Body name="thigh">
@@ -102,9 +102,9 @@ def report_encoding(subject: Subject, report: FindingCollector) -> None:
     Reports the first byte that is not UTF-8 (or the encoding of the XML declaration). osimlite then
     reads the file as Windows text (cp1252). A file in UTF-16 or UTF-32 is an error.
 
-    OpenSim copies the bytes unchanged, but every other XML reader rejects the file, and names with
-    accents differ between programs. OpenSim cannot load a file with two bytes per letter. Save it
-    as UTF-8.
+    OpenSim copies the bytes unchanged. But every other XML reader rejects the file, and names with
+    accents differ between programs. A file in UTF-16 or UTF-32 cannot be loaded by OpenSim at all.
+    Save the file as UTF-8.
 
     ```document
     - <?xml version="1.0" encoding="US-ASCII" ?>
@@ -148,10 +148,10 @@ def report_not_a_model(subject: Subject, report: FindingCollector) -> None:
     """The document is XML, but not an OpenSim model.
 
     Reports a root element other than `<OpenSimDocument>`, with the correct spelling if it is known,
-    and a document without a `<Model>`. In a folder, XML counts as OpenSim's if its root has nearly
-    that name, or if it contains a class of OpenSim with its properties; other XML is skipped and
-    counted. Special files (a pipe, a device), and files larger than 100 MB or the setting
-    `largest-file`, are reported and not read.
+    and a document without a `<Model>`. In a folder, osimlite skips and counts XML files of other
+    programs. A file counts as OpenSim's if its root is spelt almost like `OpenSimDocument`, or if
+    it contains a class of OpenSim with its properties. Special files (a pipe, a device), and files
+    larger than 100 MB or the setting `largest-file`, are reported and not read.
 
     OpenSim fails with a message about a missing node, or creates an empty model without a message.
 
@@ -185,11 +185,12 @@ def report_not_a_model(subject: Subject, report: FindingCollector) -> None:
 def report_document_version(subject: Subject, report: FindingCollector) -> None:
     """The document has no version or an unsupported one.
 
-    Reports a `Version` that is missing, not a whole number, too old for osimlite, newer than that
-    of OpenSim 4.6, or older than the first version with a socket that the document uses.
+    Reports a `Version` that is missing, not a whole number, too old for osimlite, or newer than
+    that of OpenSim 4.6. Also reports a version that is too old for a socket in the document:
+    OpenSim had no such socket at that time.
 
-    OpenSim reads each file by the rules of its version. Without a version it fails; from an unknown
-    version it reads what it understands, without a message (a warning).
+    OpenSim reads each file by the rules of its version. If the version is missing, OpenSim fails.
+    If the version is unknown, OpenSim reads what it understands, without a message (a warning).
 
     ```document
     - <OpenSimDocument>
@@ -292,8 +293,8 @@ def report_duplicate_attribute(subject: Subject, report: FindingCollector) -> No
 
     Reports two attributes with the same name.
 
-    It is not valid XML. OpenSim uses the last one without a message; every other reader rejects the
-    file.
+    This is not valid XML. OpenSim uses the last attribute without a message; every other reader
+    rejects the file.
 
     ```xml
     - <Marker name="hip" name="asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>

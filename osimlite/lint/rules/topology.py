@@ -30,9 +30,9 @@ def report_unconnected_body(subject: Subject, report: FindingCollector) -> None:
 
     Reports bodies that no chain of joints connects to ground.
 
-    OpenSim adds a free joint to ground, and the body falls freely (a warning). If it has no mass,
-    OpenSim rejects the model. It also rejects the model, or crashes, if an offset frame or a joint
-    is on a body that comes before the last added joint in the tree.
+    OpenSim adds a free joint to ground, and the body falls freely (a warning). If the body has no
+    mass, OpenSim rejects the model. OpenSim adds such joints late: it may also reject the model, or
+    crash, if offset frames or other joints are on an unconnected body.
 
     ```xml
       <Body name="ball"> <mass>1</mass> <inertia>0.1 0.1 0.1 0 0 0</inertia> </Body>
@@ -87,11 +87,11 @@ def report_closed_loop(subject: Subject, report: FindingCollector) -> None:
 
     Reports each joint that connects bodies that earlier joints already connect.
 
-    OpenSim cuts the loop: it splits a body and welds the halves with a constraint. That adds
-    coordinates and multipliers that are not in the file, and the halves together have a different
-    mass or inertia from the body, so the model moves differently even where the loop closes. Where
-    it does not close in the default pose, or the joint is a CustomJoint, OpenSim rejects the model.
-    Use a constraint instead.
+    OpenSim cuts the loop: it splits a body, and welds the halves with a constraint. That adds
+    coordinates and multipliers that are not in the file. The halves together have another mass or
+    inertia than the body, so the model moves differently even if the loop closes. If the loop does
+    not close in the default pose, or the joint is a CustomJoint, OpenSim rejects the model. Use a
+    constraint instead of the joint.
 
     ```xml
     - <WeldJoint name="strut">
@@ -137,10 +137,10 @@ def report_parallel_joints(subject: Subject, report: FindingCollector) -> None:
     Reports the second joint between one pair of bodies.
 
     OpenSim splits the child, lets each joint carry one half, and welds the halves with a
-    constraint: more coordinates than the mechanism needs, and inertias that are not in the file. It
-    replaces a second WeldJoint by a constraint. It ignores a second FreeJoint but counts the mass
-    of the child twice. It rejects the model if the second joint is a CustomJoint, if its child is
-    ground, or if it is a WeldJoint or a FreeJoint to ground.
+    constraint. The model then has more coordinates than the mechanism needs, and inertias that are
+    not in the file. OpenSim replaces a second WeldJoint by a constraint. It ignores a second
+    FreeJoint, but counts the mass of the child twice. It rejects the model if the second joint is a
+    CustomJoint, if its child is ground, or if it is a WeldJoint or a FreeJoint to ground.
 
     ```xml
     - <PinJoint name="hip_again">
@@ -177,11 +177,11 @@ def report_parallel_joints(subject: Subject, report: FindingCollector) -> None:
 def report_massless_leaf(subject: Subject, report: FindingCollector) -> None:
     """A body without mass is the last of its chain.
 
-    Reports bodies of mass 0 that move and carry nothing with mass.
+    Reports bodies of mass 0 that can move and carry no body with mass.
 
-    A force on such a body gives it an infinite acceleration: the mass matrix is singular, and
-    OpenSim rejects the model, or (at a CustomJoint) computes NaN. Between two bodies with mass, or
-    welded to one, a massless body is fine.
+    A force on such a body gives it an infinite acceleration: the mass matrix is singular. OpenSim
+    rejects the model, or computes NaN (at a CustomJoint). A massless body is fine between two
+    bodies with mass, or welded to one.
 
     ```xml
     - <Body name="shank"> <mass>0</mass> </Body>

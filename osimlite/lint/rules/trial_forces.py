@@ -133,8 +133,8 @@ def report_residual_force(trial: Trial, report: FindingCollector) -> None:
     enough?, https://doi.org/10.1115/1.4029304). A peak that exceeds one of the two limits, but not
     both, is okay. Residuals of inverse dynamics are an info if the trial has RRA or CMC, too.
 
-    Motion, masses and measured loads contradict each other. The residual force compensates for it
-    instead of the muscles.
+    Motion, masses and measured loads contradict each other. The residual force, instead of the
+    muscles, makes up for the difference.
 
     ```trial
     - peak of FY of RRA: 61 N, with loads of 850 N
@@ -163,8 +163,8 @@ def report_residual_moment(trial: Trial, report: FindingCollector) -> None:
     of the mass centre (2015, Is my model good enough?, https://doi.org/10.1115/1.4029304), which is
     much less. A peak between this limit and OpenSim's is okay.
 
-    The trunk is where most of the mass is, and its mass centre is hard to measure: the residual
-    moments show that it is off, or that the loads act in another place.
+    Most of the mass is in the trunk, and its mass centre is hard to measure. A residual moment
+    shows that this mass centre is wrong, or that the loads act in another place.
 
     ```trial
     - peak of MZ of RRA: 96 N m, with loads times height of 800 N m
@@ -195,8 +195,8 @@ def report_reserve_moment(trial: Trial, report: FindingCollector) -> None:
     https://simtk-confluence.stanford.edu:8443/plugins/viewsource/viewpagesrc.action?pageId=3376337).
     Moments below 1 N m are not checked.
 
-    The muscles are too weak for the motion, or their paths are wrong; the forces of all muscles at
-    this joint are too small.
+    The muscles at this joint are too weak for the motion, or their paths are wrong. The computed
+    forces of all these muscles are too small.
 
     ```trial
     - peak of the reserve of 'ankle_angle_r' relative to its joint moment: 34 %

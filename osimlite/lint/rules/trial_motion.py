@@ -89,15 +89,15 @@ WRONG_WEIGHT = Threshold(
 def report_scale_marker_error(trial: Trial, report: FindingCollector) -> None:
     """A scaled model does not fit the static trial.
 
-    Runs the setup of the ScaleTool, which puts the scaled model into the static pose, and compares
-    its markers with the measured ones, before the markers are moved. Only markers with more than a
-    tenth of the largest weight count. Accepts 1 cm for the root mean square, and 2 cm for the
-    largest error of markers on bones. The limits are those of OpenSim's checklist for evaluating a
-    simulation
+    Runs the setup of the ScaleTool up to the step that poses the scaled model as in the static
+    trial. Compares the markers of the model with the measured ones; the tool has not yet moved
+    them. Only markers with more than a tenth of the largest weight count. Accepts 1 cm for the root
+    mean square, and 2 cm for the largest error of markers on bones. The limits are those of
+    OpenSim's checklist for evaluating a simulation
     (https://simtk-confluence.stanford.edu:8443/plugins/viewsource/viewpagesrc.action?pageId=3376337).
 
-    Everything that follows is computed with these lengths of segments: joint positions and moment
-    arms differ from those of the subject.
+    All later results are computed with the segment lengths of this model: its joint positions and
+    moment arms differ from those of the subject.
 
     ```trial
     - peak of marker errors: 3.1 cm
@@ -118,10 +118,10 @@ def report_marker_error(trial: Trial, report: FindingCollector) -> None:
     """A motion does not fit the measured markers.
 
     Poses the model along the motion of an InverseKinematicsTool, and compares the fitted markers
-    with the measured ones: less than 2 cm for the root mean square over all frames, and less than 4
-    cm for the largest error. The limits are those of OpenSim's best practices
-    (https://opensimconfluence.atlassian.net/wiki/spaces/OpenSim/pages/53087686). Without the model
-    or the markers it uses the file of errors that the tool writes.
+    with the measured ones. Accepts 2 cm for the root mean square over all frames, and 4 cm for the
+    largest error. The limits are those of OpenSim's best practices
+    (https://opensimconfluence.atlassian.net/wiki/spaces/OpenSim/pages/53087686). If the model or
+    the markers are missing, the rule uses the file of errors that the tool writes.
 
     Marker errors make angles wrong. One bad marker also affects the neighbouring segments.
 
@@ -142,12 +142,13 @@ def report_marker_error(trial: Trial, report: FindingCollector) -> None:
 def report_swapped_markers(trial: Trial, report: FindingCollector) -> None:
     """Two markers are swapped.
 
-    Where a marker error exceeds 4 cm, the rule swaps each pair of markers in the worst frame and
-    fits the pose again. A pair that halves the sum of squared errors is probably swapped; it is
-    then swapped in 24 frames from first to last, and the rule reports in how many the fit improves.
+    Checks motions with a marker error of more than 4 cm. In the worst frame, the rule swaps each
+    pair of markers and fits the pose again. If a swap halves the sum of squared errors, the pair is
+    probably swapped. The rule then swaps this pair in 24 frames from the first to the last, and
+    reports in how many of them the fit improves.
 
-    Inverse kinematics compromises between both wrong positions, and rotates the segment; where left
-    and right are swapped it rotates the whole body, and other markers seem to be wrong.
+    Inverse kinematics compromises between both wrong positions, and rotates the segment. If left
+    and right are swapped, it rotates the whole body, and other markers seem to be wrong.
 
     ```trial
     - share of frames in which R.Knee and R.Ankle would fit exchanged: 38 %
@@ -192,17 +193,17 @@ def report_beyond_range(trial: Trial, report: FindingCollector) -> None:
 def report_filter_content(trial: Trial, report: FindingCollector) -> None:
     """A filter removes motion, or leaves noise.
 
-    Applies the filter of the setup to the motion of a tool. Checks by how much it changes any
-    coordinate: 2 degrees or 2 cm (root mean square) are what OpenSim's best practices call good for
-    a motion that is tracked
+    Applies the filter of the setup to the motion of a tool, and checks how much each coordinate
+    changes. The limit is 2 degrees or 2 cm (root mean square), which OpenSim's best practices call
+    good for a tracked motion
     (https://opensimconfluence.atlassian.net/wiki/spaces/OpenSim/pages/53087686). For a motion from
-    markers it also checks the noise: at most half of the power of the accelerations may lie above
-    15 Hz, as human gait is slower (Winter 2009, Biomechanics and Motor Control of Human Movement,
-    chapter 3).
+    markers the rule also checks the noise: at most half of the power of the accelerations may lie
+    above 15 Hz. Human gait is slower (Winter 2009, Biomechanics and Motor Control of Human
+    Movement, chapter 3).
 
     Forces are computed from accelerations, and noise of a tenth of a degree is enough to make
-    accelerations useless. A filter that is
-    too strong removes the motion itself, above all at foot strike.
+    accelerations useless. A filter that is too strong removes the motion itself, above all at foot
+    strike.
 
     ```trial
     - change of 'knee_angle_r' by a filter of 1 Hz: 9.1 deg
@@ -229,11 +230,12 @@ def report_filter_content(trial: Trial, report: FindingCollector) -> None:
 def report_swapped_feet(trial: Trial, report: FindingCollector) -> None:
     """A force plate is assigned to the wrong foot.
 
-    Poses the model along its motion where a measured force is large, and checks whether the force
-    acts nearer to another loaded body, or to the body of the other side, than to its own body.
+    Checks the times at which a measured force is large, with the model in its pose at each time.
+    Reports a force that acts nearer to another loaded body, or to the body of the other side, than
+    to the body to which the setup applies it.
 
-    All moments of both legs are wrong by the force times the step width or length, and the
-    residuals show it.
+    All moments of both legs are wrong by the force times the step width or length. The residuals
+    show this error.
 
     ```trial
     - share of the time that the force 'right' acts nearer to calcn_l than to calcn_r: 100 %
@@ -260,8 +262,8 @@ def report_measured_weight(trial: Trial, report: FindingCollector) -> None:
     difference of more than 5 % of the weight exceeds the largest residual force that Hicks and
     others recommend (2015, Is my model good enough?, https://doi.org/10.1115/1.4029304).
 
-    A residual force compensates for it all the time, and the leg moments belong to another person.
-    A missing plate, or a wrong calibration, has the same effect.
+    All the time, a residual force makes up for the difference, and the leg moments belong to
+    another person. A missing plate, or a wrong calibration, has the same effect.
 
     ```trial
     - difference between the model's mass, 80.8 kg, and 72.1 kg on the plates: 12 %

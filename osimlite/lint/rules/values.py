@@ -41,8 +41,8 @@ def report_unreadable_value(subject: Subject, report: FindingCollector) -> None:
     or brackets between the numbers of a vector.
 
     OpenSim writes a line to its log, ignores the value and keeps the default. A locked coordinate
-    is then free, a contact sphere is at the origin. Where OpenSim reads the intended value anyway,
-    such as false for `no`, it is a warning.
+    is then free, for example, or a contact sphere is at the origin. If OpenSim reads the intended
+    value anyway, such as false for `no`, the finding is a warning.
 
     ```xml
     - <ContactSphere name="heel"> <socket_frame>/bodyset/shank</socket_frame> <location>0, -0.2, 0</location>
@@ -85,8 +85,8 @@ def report_wrong_count(subject: Subject, report: FindingCollector) -> None:
 
     Reports vectors and lists whose length differs from that of the property.
 
-    With too few numbers OpenSim uses the default; of too many it uses the first ones, or the
-    default.
+    If there are too few numbers, OpenSim uses the default. If there are too many, it uses the first
+    ones, or the default.
 
     ```xml
     - <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02</inertia> </Body>
@@ -115,8 +115,8 @@ def report_cut_number(subject: Subject, report: FindingCollector) -> None:
     (`1/3`), hexadecimal digits (`0x10`), Fortran's exponent (`1d3`).
 
     OpenSim reads the longest beginning that is a number and ignores the rest without a message:
-    `1,5` is 1, `0x10` is 0. Where only a separator follows, as in `0.1, 0.5`, it reads the intended
-    number: that is a warning.
+    `1,5` is 1, `0x10` is 0. If only a separator follows, as in `0.1, 0.5`, OpenSim reads the
+    intended number (a warning).
 
     ```xml
     - <Body name="thigh"> <mass>8,5</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
@@ -148,10 +148,10 @@ def report_empty_value(subject: Subject, report: FindingCollector) -> None:
     Reports empty numbers, vectors and switches, and empty elements that should contain an object.
     Optional properties may be empty.
 
-    OpenSim writes a line to its log and keeps the default: that is a warning. The mass of a body
-    has no default, nor have numbers of older setup classes, such as `initial_time` of AnalyzeTool:
-    OpenSim rejects the file. Where an object is missing, OpenSim fails as soon as it needs one.
-    Both are errors.
+    OpenSim usually writes a line to its log and keeps the default (a warning). The mass of a body
+    has no default, and numbers of older setup classes have none either, such as `initial_time` of
+    AnalyzeTool: OpenSim rejects the file. If an object is missing, OpenSim fails as soon as it
+    needs one. These two cases are errors.
 
     ```xml
       <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>

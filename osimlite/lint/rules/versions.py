@@ -16,15 +16,16 @@ from osimlite.schema.specs import FieldSpec
 def report_newer_class(subject: Subject, report: FindingCollector) -> None:
     """A class or a property is newer than the target version of OpenSim.
 
-    Reports classes and properties that were added to OpenSim after the target version, with the
-    first version that has them and the earlier name of a property. The target version is 4.6, or
-    what the setting `target-version` or the option `--target-version` says (4.0 to 4.6). Properties
-    with their default value are reported for information, and so is a format number that is too
-    new: no version of OpenSim rejects a file for it.
+    Reports classes and properties that were added to OpenSim after the target version. Says which
+    version first has them, and the earlier name of a property. The target version is 4.6, or what
+    the setting `target-version` or the option `--target-version` says (4.0 to 4.6). A newer
+    property that has its default value is an info. A format number that is too new is also an info,
+    because no version of OpenSim rejects a file for it.
 
     In a set (bodies, joints, forces ...) OpenSim rejects an object of an unknown class; elsewhere
     it leaves the object out. It ignores unknown properties without a message. The format number
-    does not distinguish them: it is the same from 4.0 to 4.4 and from 4.5.1 to 4.6.
+    alone does not show which version a file needs: it is the same from 4.0 to 4.4, and from 4.5.1
+    to 4.6.
 
     ```xml
     - <CoordinateLinearStopForce name="stop">

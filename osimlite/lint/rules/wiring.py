@@ -62,11 +62,12 @@ def report_control_function_count(subject: Subject, report: FindingCollector) ->
 def report_broken_input(subject: Subject, report: FindingCollector) -> None:
     """An input refers to an output that does not exist.
 
-    Follows the inputs of reporters, controllers and geometry: the path of a component, a bar, and
-    one of its outputs of the type that the input takes.
+    Checks the inputs of reporters, controllers and geometry. An input must consist of the path of a
+    component, a bar (|), and an output of this component. The output must have the type that the
+    input takes.
 
-    OpenSim rejects the model when it connects the components. Paths are absolute or relative to the
-    component with the input. OpenSim also rejects an input of a geometry that a frame draws.
+    OpenSim rejects the model when it connects the components. Paths are absolute, or relative to
+    the component with the input. OpenSim also rejects any input of a geometry that a frame draws.
 
     ```xml
       <components>

@@ -28,9 +28,9 @@ def report_swallowed_point(subject: Subject, report: FindingCollector) -> None:
     Reports points that are fixed to the body of a cylinder (taken as infinitely long), a sphere or
     an ellipsoid, inside it and within the `range` of the wrap.
 
-    OpenSim does not wrap a segment that begins or ends inside: the path goes straight through the
-    surface, in every pose and without a message. A point may be inside by less than a millimetre,
-    for example after scaling.
+    OpenSim does not wrap a segment that begins or ends inside the surface. The path goes straight
+    through it, in every pose and without a message. The point may be inside by less than a
+    millimetre, for example after scaling.
 
     ```xml
       <PathPoint name="band_a"> <location>0.02 0 0.02</location> </PathPoint>
@@ -78,11 +78,11 @@ def report_wrap_range(subject: Subject, report: FindingCollector) -> None:
     Reports wraps whose `range` ends at the point where it begins, or before it. A range that ends
     beyond the last point is an error.
 
-    The path never wraps around the surface; where the range ends before it begins, OpenSim also
-    ignores all later wraps of the path. With a range beyond the last point it fails when it
-    computes a length, and its message names no wrap. (It does not fail in poses in which no
-    conditional point of an earlier wrap is active.) Points count from 1, and -1 stands for either
-    end.
+    The path never wraps around the surface. If the range ends before it begins, OpenSim also
+    ignores all later wraps of the path. If the range ends beyond the last point, OpenSim fails when
+    it computes the path length, and its message names no wrap. (It does not fail in poses in which
+    no conditional point of an earlier wrap is active.) Points count from 1, and -1 stands for
+    either end.
 
     ```xml
     - <PathWrap name="around"> <wrap_object>condyle</wrap_object> <range>2 1</range> </PathWrap>
