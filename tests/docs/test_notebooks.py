@@ -45,12 +45,12 @@ def test_it_runs(name: str) -> None:
     assert not any(cell.get("outputs") or cell.get("execution_count") for cell in kept.cells), (
         "strip its outputs"
     )
-    notebook = notebooks.execute(path)
+    notebook = notebooks.execute_notebook(path)
     if not any(cell.get("outputs") for cell in notebook.cells):
         pytest.skip(
             f"needs {notebook.metadata['needs']}, beside the notebook or in the shared folder"
         )
-    text = "\n\n".join(notebooks.parts(path, notebook))
+    text = "\n\n".join(notebooks.convert_cells(path, notebook))
     shown = notebooks.on_page_content(re.sub(r"^output .*$", r"<p>\g<0></p>", text, flags=re.M))
     assert all(words in shown for words in SHOWN[name]) and "<p>output" not in shown
 
@@ -72,10 +72,10 @@ def test_an_executed_notebook_is_cached_until_something_changes(
         nbformat.write(nbformat.v4.new_notebook(cells=cells), path)
 
     def read_output() -> str:
-        return str(notebooks.execute_once(path).cells[0].outputs[0].text)
+        return str(notebooks.execute_with_cache(path).cells[0].outputs[0].text)
 
     path = tmp_path / "a.ipynb"
-    monkeypatch.setattr(notebooks, "execute", execute)
+    monkeypatch.setattr(notebooks, "execute_notebook", execute)
     monkeypatch.setattr(notebooks, "user_cache_folder", lambda: tmp_path / "cache")
     write("1")
     assert [read_output(), read_output()] == ["run 1", "run 1"]
