@@ -205,7 +205,8 @@ class StorageHeader:
     @property
     def is_strict(self) -> bool:
         """True if OpenSim's newer reader reads the file: every row is a line, and NaN is a value."""
-        return self.form > 1
+        # Vectors are read by the newer reader alone, whatever the version.
+        return self.form > 1 or self.parts > 1
 
     @property
     def kind(self) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from math import inf, isfinite, isnan, nan
 from pathlib import Path
 
 from osimlite.base.files import open_file
@@ -11,6 +12,12 @@ from osimlite.base.patterns import compile_later
 from osimlite.base.text import format_count
 from osimlite.errors import DocumentError
 from osimlite.io.tables.headers import MAX_HEADER_BYTES, StorageHeader, list_suffixes
+from osimlite.io.tables.vector_rows import (
+    BLANKS,
+    parse_leading_number,
+    split_vector,
+    split_vector_row,
+)
 
 _NO_NUMBER = compile_later(r"[-+]?1\.#(IND|QNAN|SNAN|INF)\d*", re.IGNORECASE)
 """Pattern of NaN and infinity as programs on Windows wrote them."""
@@ -46,11 +53,27 @@ class TableStream:
         time_column = self._time
         size = len(self.columns) + 1
         vectors = self.kind != "double"
+        last_time = -inf
         for number, data in enumerate(self._stream, start=self.line + 1):
             # A broken character belongs to a word that is reported, not to an error of decoding.
             line = data.decode("utf-8", "replace")
             self.line, self.text = number, line
-            text = line.replace(",", " ") if vectors else line
+            if vectors:
+                # An empty line ends the table for OpenSim; here it is passed over, as in other
+                # tables, so that no row is lost.
+                if line.rstrip("\r\n"):
+                    time, row = self._parse_vectors(line, number)
+                    if not time > last_time:
+                        raise DocumentError(
+                            f"the time {time:g} does not come after {last_time:g}",
+                            file=self.file,
+                            line=number,
+                            column=1,
+                        )
+                    last_time = time
+                    yield time, row
+                continue
+            text = line
             try:
                 # The fast path: nearly all rows are plain numbers.
                 row = list(map(float, text.split()))
@@ -70,6 +93,68 @@ class TableStream:
             # The time may be in any column in files of version 1.
             time = row.pop(time_column)
             yield time, row
+
+    def _parse_vectors(self, line: str, number: int) -> tuple[float, list[float]]:
+        """Return the time and the numbers of a row of vectors, as OpenSim reads them.
+
+        Args:
+            line: text of the row.
+            number: number of the line.
+
+        Raises:
+            DocumentError: OpenSim rejects the row, or its time is not a number.
+        """
+        # The fast path: nearly all rows are plain numbers. A sum that is not finite, underscores
+        # and digits of other scripts need a closer look, since Python reads more than OpenSim.
+        if [cell.count(",") for cell in line.split("\t")] == self._commas:
+            try:
+                row = list(map(float, line.replace("\t", ",").split(",")))
+            except ValueError:
+                row = [nan]
+            if isfinite(sum(row)) and line.isascii() and "_" not in line:
+                return row.pop(0), row
+        time, *cells = split_vector_row(line) or [""]
+        count = len(self.labels)
+        if len(cells) != count:
+            raise DocumentError(
+                f"the row has {format_count(len(cells) + 1, 'cell')} and needs {count + 1}, with tabs between them",
+                file=self.file,
+                line=number,
+                column=len(line.rstrip()) + 1,
+            )
+        value = parse_leading_number(time)
+        if isnan(value):
+            problem = f"'{time.strip()}' is not a number" if time.strip() else "the time is missing"
+            raise DocumentError(problem, file=self.file, line=number, column=1)
+        return value, self._parse_special_vectors(cells, number, len(time) + 2)
+
+    def _parse_special_vectors(self, cells: list[str], number: int, column: int) -> list[float]:
+        """Return the numbers of cells that hold other words than plain numbers.
+
+        Args:
+            cells: cells after the time.
+            number: number of the line.
+            column: column of the first cell in the line, from 1.
+        """
+        row = []
+        size = self._size
+        for label, cell in zip(self.labels, cells, strict=True):
+            parts = split_vector(cell)
+            if len(parts) != size:
+                raise DocumentError(
+                    f"the cell of column '{label}' has {format_count(len(parts), 'number')} and needs {size}",
+                    file=self.file,
+                    line=number,
+                    column=column,
+                )
+            row += [
+                # Programs on Windows wrote NaN as `1.#QNAN`. OpenSim reads 1 from it, but the
+                # measurement is missing.
+                nan if _NO_NUMBER.fullmatch(part.strip(BLANKS)) else parse_leading_number(part)
+                for part in parts
+            ]
+            column += len(cell) + 1
+        return row
 
     def _parse_special_row(self, text: str, number: int) -> list[float]:
         """Return the numbers of a row that has other words than plain numbers."""
@@ -126,6 +211,9 @@ class TableStream:
         self._time = time_column
         self.labels = (*labels[:time_column], *labels[time_column + 1 :])
         self.columns = tuple(label + end for label in self.labels for end in ends)
+        # Number of values of a cell, and of commas in the cells of a row of vectors.
+        self._size = len(ends)
+        self._commas = [0] + [len(ends) - 1] * len(self.labels)
 
 
 def _make_format_error(beginning: bytes) -> str:

@@ -79,7 +79,17 @@ def test_faults_are_placed(tmp_path, text, line, words):
         ("t\nendheader\ntime\ta\n0\t1\n1\n", 5, 2, "1 number and needs 2"),
         ("t\nendheader\ntime\ta\n\n0\t1 22\n", 5, 5, "3 numbers and needs 2"),
         ("t\nendheader\ntime\ta\n0\t one\n", 4, 4, "'one' is not a number"),
-        ("t\nDataType=Vec3\nendheader\ntime\ta\n0\t1,2\n", 5, 6, "3 numbers and needs 4"),
+        ("t\nDataType=Vec3\nendheader\ntime\ta\n0\t1,2\n", 5, 3, "'a' has 2 numbers and needs 3"),
+        ("t\nDataType=Vec3\nendheader\ntime\ta\n0\t\t1,2,3\n", 5, 9, "3 cells and needs 2"),
+        ("t\nDataType=Vec3\nendheader\ntime\ta\n0 1,2,3\n", 5, 8, "1 cell and needs 2, with tabs"),
+        ("t\nDataType=Vec3\nendheader\ntime\ta\n\t1,2,3\n", 5, 1, "the time is missing"),
+        ("t\nDataType=Vec3\nendheader\ntime\ta\nx\t1,2,3\n", 5, 1, "'x' is not a number"),
+        (
+            "t\nDataType=Vec2\nendheader\ntime\ta\n0\t1,2\n0.\t1,2\n",
+            6,
+            1,
+            "0 does not come after 0",
+        ),
     ],
 )
 def test_faults_have_a_column(tmp_path, text, line, column, words):
@@ -114,6 +124,21 @@ def test_values_of_several_numbers(tmp_path, kind, size, last):
     table = read_sto(path)
     assert (table.kind, len(table.columns), table.columns[-1]) == (kind, 2 * size, last)
     assert np.array_equal(table.rows, rows)
+
+
+@pytest.mark.parametrize(
+    ("row", "numbers"),
+    [
+        ("0.5\t1, 2 ,3,\t4,5,6\t", [0.5, 1, 2, 3, 4, 5, 6]),
+        ("0.5\t1,,x\tnan,inf,6", [0.5, 1, np.nan, np.nan, np.nan, np.nan, 6]),
+        ("0.5,\t1x,0x10,1_0\t5e,1.#IND,6", [0.5, 1, 0, 1, np.nan, np.nan, 6]),
+    ],
+)
+def test_vectors_are_read_as_opensim_reads_them(tmp_path, row, numbers):
+    path = tmp_path / "v.sto"
+    path.write_text(f"DataType=Vec3\nversion=3\nendheader\ntime\ta\tb\n0\t1,2,3\t4,5,6\n{row}\n\n")
+    table = read_sto(path)
+    assert np.array_equal([table.times[1], *table.rows[1]], numbers, equal_nan=True)
 
 
 def test_what_older_programs_wrote(tmp_path):
