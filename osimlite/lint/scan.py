@@ -11,13 +11,19 @@ from array import array
 from collections.abc import Callable, Iterator
 from functools import lru_cache
 from itertools import groupby, islice, pairwise
-from math import inf, nan, nextafter
+from math import inf, isfinite, isnan, nan, nextafter
 from operator import lt
 
 from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.patterns import compile_later
 from osimlite.base.records import dataclass, field
 from osimlite.base.text import format_count
+from osimlite.io.tables.vector_rows import (
+    BLANKS,
+    parse_leading_number,
+    split_vector,
+    split_vector_row,
+)
 from osimlite.lint.shapes import MARKERS, ROWS, VECTORS, RowLayout, compute_shapes
 
 _MAX_FAULTS = 50
@@ -27,10 +33,10 @@ _MAX_FAULTS = 50
 class RowFault(NamedTuple):
     """Fault in the rows of a table: its kind and column, its first position, and how often it occurs.
 
-    `kind` is ``cell`` (no number), ``row`` (`number` of cells, `text` with details),
-    ``comment``, ``blank``, ``order``, ``time`` (no number), ``part`` (a part of a marker), ``zero``
-    (a marker at the origin) or ``frame`` (a wrong number). `others` is the number of further
-    columns with such a fault, which are not reported.
+    `kind` is ``cell`` (no number), ``vector`` (a cell with too few or too many numbers), ``row``
+    (`number` of cells, `text` with details), ``comment``, ``blank``, ``order``, ``time`` (no
+    number), ``part`` (a part of a marker), ``zero`` (a marker at the origin) or ``frame`` (a wrong
+    number). `others` is the number of further columns with such a fault, which are not reported.
     """
 
     kind: str
@@ -122,7 +128,8 @@ class RowScanner:
 
     Args:
         cells: number of cells in a row; in a marker table with the frame number.
-        parts: number of values in a cell, separated by commas.
+        parts: number of values in a cell, separated by commas. With several, tabs alone separate
+            cells.
         markers: whether this is a marker table (.trc): a tab ends every cell, cells may be empty, and
             the time is the second cell. Otherwise blanks and tabs separate cells, and the time is
             the first.
@@ -150,7 +157,7 @@ class RowScanner:
         layout = MARKERS if self.markers else VECTORS if self.parts > 1 else ROWS
         # The time is one number, also of vectors.
         cells = [b"0", *[b",".join([b"0"] * self.parts)] * (self.cells - 1)]
-        plain_shape = (b"\t" if self.markers else b"").join(cells)
+        plain_shape = (b"" if layout is ROWS else b"\t").join(cells)
         for block in _split_blocks(data, start):
             lines = block.split(b"\n")
             # Each line of a block ends with a line feed, so that the last piece is empty.
@@ -185,7 +192,8 @@ class RowScanner:
                         self._note_rows(
                             lines[selection], forms[selection], line + indices[0], zeros
                         )
-                    elif kind is False:
+                    # A line of blanks has no shape, but is no blank line in a table of vectors.
+                    elif kind is False or self.parts > 1:
                         for index in indices:
                             self.examine_odd_line(lines[index], line + index)
                     elif self.rows.count:
@@ -289,8 +297,10 @@ class RowScanner:
         """Examine one line that is not a valid row, cell by cell."""
         # One byte for each character, so that offsets count characters.
         text = text.decode("utf-8", "replace").encode("latin-1", "replace").rstrip(b"\r")
-        if not text.strip():
-            if self.rows.count:
+        # OpenSim rejects a table of vectors with a line of blanks, and ends it at an empty line,
+        # also before the first row.
+        if not (text if self.parts > 1 else text.strip()):
+            if self.rows.count or self.parts > 1:
                 self._note_fault("blank", 0, line, 0, b"")
             return
         rows = self.rows
@@ -307,7 +317,7 @@ class RowScanner:
             # their own.
             end = cells[self.cells][0] if count > self.cells else len(text.rstrip())
             blanks = (
-                self.markers
+                (self.markers or self.parts > 1)
                 and b"\t" not in text
                 and len(text.split(None, self.cells)) == self.cells
             )
@@ -319,30 +329,34 @@ class RowScanner:
                 b"",
                 "; blanks separate them, and tabs must" if blanks else "",
             )
-            if blanks:
+            if blanks and self.markers:
                 self._expect_frame(text.split(None, 1)[0], line)
+                return
+            # Without the right cells, it is unknown to which column a number belongs.
+            if blanks or self.parts > 1:
                 return
         time = 1 if self.markers else 0
         for number, (start, cell) in enumerate(cells[: self.cells]):
             if self.markers and number == 0:
                 self._expect_frame(cell, line)
             elif number == time:
-                value = parse_number(cell)
+                value = self._read_time(cell)
                 if value != value:
                     self._note_fault("time", time, line, start, cell)
-                elif not value > self._get_last_time():
+                # Only in tables of vectors is a time read that is no plain number.
+                elif value != parse_number(cell):
+                    self._note_fault("cell", time, line, start, cell)
+                if value == value and not value > self._get_last_time():
                     self._note_time_order_fault(text, line, value, self._get_last_time())
-            elif not (self.markers and cell.lower() in (b"", b"nan")):
-                parts = cell.split(b",", self.parts) if self.parts > 1 else [cell]
-                if len(parts) != self.parts or any(
-                    parse_number(part) != parse_number(part) for part in parts
-                ):
-                    self._note_fault("cell", number, line, start, cell)
+            elif self.parts > 1:
+                self._examine_vector(cell, number, line, start)
+            elif not (self.markers and cell.lower() in (b"", b"nan")) and isnan(parse_number(cell)):
+                self._note_fault("cell", number, line, start, cell)
         # A row of the right width counts even if cells are wrong, so that later times and lines
         # stay right.
         if count == self.cells > time:
             self._note_line_of_row(line)
-            value = parse_number(cells[time][1])
+            value = self._read_time(cells[time][1])
             rows.times.append(value if value == value else nextafter(self._get_last_time(), inf))
             rows.count += 1
             if self.markers:
@@ -352,10 +366,45 @@ class RowScanner:
                 rows.unseen -= _find_present_markers(form, self.cells) or set()
                 self._examine_markers(text, line)
             if self._count_missing_samples() > 0:
-                rows.samples.append(self._read_numbers(text, parse_number))
+                rows.samples.append(
+                    self._read_vectors(cells)
+                    if self.parts > 1
+                    else self._read_numbers(text, parse_number)
+                )
+
+    def _read_time(self, cell: bytes) -> float:
+        """Return the time in a cell; NaN for a text without one."""
+        # In tables of vectors, OpenSim ignores what follows the number.
+        return (
+            parse_leading_number(cell.decode("latin-1")) if self.parts > 1 else parse_number(cell)
+        )
+
+    def _examine_vector(self, cell: bytes, number: int, line: int, start: int) -> None:
+        """Record a wrong number of values in a cell of several, or its first value that is no number."""
+        parts = split_vector(cell.decode("latin-1"))
+        if len(parts) != self.parts:
+            self._note_fault("vector", number, line, start, cell)
+            return
+        for part in parts:
+            word = part.strip(BLANKS).encode("latin-1")
+            if not isfinite(parse_number(word)):
+                start += len(part) - len(part.lstrip(BLANKS))
+                self._note_fault("cell", number, line, start, word)
+                return
+            start += len(part) + 1
+
+    def _read_vectors(self, cells: list[tuple[int, bytes]]) -> list[float]:
+        """Return the numbers of a row of vectors; NaN for those that are missing."""
+        result = [parse_number(cells[0][1])]
+        for _, cell in cells[1:]:
+            values = list(map(parse_leading_number, split_vector(cell.decode("latin-1"))))
+            result += [*values, *[nan] * self.parts][: self.parts]
+        return result
 
     def _split_cells(self, text: bytes) -> tuple[list[tuple[int, bytes]], int]:
         """Return the cells of a row with their offsets, at most one too many, and the number of all cells."""
+        if self.parts > 1:
+            return self._split_cells_of_vectors(text)
         if not self.markers:
             words = _WORD.finditer(text)
             cells = [(match.start(), match[0]) for match in islice(words, self.cells + 1)]
@@ -369,6 +418,19 @@ class RowScanner:
         # A tab may end the last cell, too.
         ends = count == self.cells + 1 and not cells[-1][1]
         return cells[: len(cells) - ends], count - ends
+
+    def _split_cells_of_vectors(self, text: bytes) -> tuple[list[tuple[int, bytes]], int]:
+        """Return the cells of a row of vectors with their offsets, and the number of all cells."""
+        result: list[tuple[int, bytes]] = []
+        start = 0
+        pieces = split_vector_row(text.decode("latin-1"))
+        for number, piece in enumerate(pieces[: self.cells + 1]):
+            cell = piece.lstrip(BLANKS)
+            offset = start + len(piece) - len(cell)
+            # Blanks after the time are not part of it; `split_vector` removes those after a cell.
+            result.append((offset, (cell if number else cell.rstrip(BLANKS)).encode("latin-1")))
+            start += len(piece) + 1
+        return result, len(pieces)
 
     def _get_last_time(self) -> float:
         """Return the time of the last row."""

@@ -71,8 +71,14 @@ def _make_layout(separators: bytes, *more_characters: tuple[bytes, int, int]) ->
 
 ROWS = _make_layout(b"", (b"\n", _SPACE, _POWER | _POINT))
 """Rows of numbers with blanks and tabs between them."""
-VECTORS = _make_layout(b",", (b"\n", _SPACE, _POWER | _POINT), (b",", _SPACE, _POWER | _SPACE))
-"""Rows of several numbers each, with commas between these."""
+VECTORS = _make_layout(
+    b"\t,",
+    (b"\n", _SPACE, _POWER | _SPACE | _POINT),
+    # Tabs end cells: OpenSim rejects a row with an empty cell.
+    (b"\t", _SPACE, _POWER | _SPACE),
+    (b",", _SPACE, _POWER | _POINT),
+)
+"""Rows of cells with tabs between them, and several numbers each with commas between these."""
 MARKERS = _make_layout(
     b"\t",
     (b"\n", _SPACE, _POWER | _SPACE | _POINT),

@@ -57,6 +57,11 @@ class Table(CheckTarget):
         return isinstance(self.header, StorageHeader) and self.header.is_strict
 
     @property
+    def parts(self) -> int:
+        """Number of values of a cell; 1 except in tables of vectors."""
+        return self.header.parts if isinstance(self.header, StorageHeader) else 1
+
+    @property
     def labels(self) -> list[Word]:
         """Labels of the columns including time; in a marker file only those of the markers."""
         return self.header.labels
@@ -86,7 +91,12 @@ class Table(CheckTarget):
         # new.
         if not header.labels or "," in header.labels[0].text:
             return TableRows()
-        if first_row and str(len(first_row[0].split())) == header.value("nColumns"):
+        # OpenSim ignores the count in tables of vectors, where blanks do not separate cells.
+        if (
+            header.parts == 1
+            and first_row
+            and str(len(first_row[0].split())) == header.value("nColumns")
+        ):
             cells = len(first_row[0].split())
         return RowScanner(cells, header.parts).scan(self.data, header.rows, header.row_line)
 

@@ -184,8 +184,69 @@ def test_rows_of_vectors_are_taken_many_at_a_time(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(RowScanner, "examine_odd_line", noted)
     result = RowScanner(3, 3).scan("".join(lines).encode(), 0, 7)
     assert odd == [27] and result.count == 50 and list(result.times[:2]) == [0.0, 0.1]
-    assert [(fault.kind, fault.line) for fault in result.faults.values()] == [("cell", 27)]
+    assert [(fault.kind, fault.line) for fault in result.faults.values()] == [("vector", 27)]
     assert result.samples[1] == [0.1, 1.0, -2e-3, 1.0, 0.5, 0.25, -1.0]
+
+
+ROWS_OF_VECTORS = [
+    # OpenSim reads blanks around numbers, and an empty text at the end of a cell or of a row.
+    ("0.1\t1, 2,3\t4 ,5 , 6", []),
+    ("  .1 \t 1,2,3, \t4,5,6,", []),
+    ("0.1\t1,2,3\t4,5,6\t", []),
+    # It reads NaN, or the number at the beginning of a text.
+    ("0.1\t1,,3\t4,5,6", [("OSIM807", 7, "warning", "missing (column 'a'): OpenSim reads it as NaN")]),
+    ("0.1\t1,2,3\t4, x,6", [("OSIM807", 14, "warning", "'x' is not a number (column 'b'): OpenSim reads it as NaN")]),
+    ("0.1\t1x,2,3\t4,5,6", [("OSIM807", 5, "warning", "'1x' is not a number (column 'a'): OpenSim reads 1")]),
+    ("0.1,\t1,2,3\t4,5,6", [("OSIM807", 1, "warning", "'0.1,' is not a number (column 'time'): OpenSim reads 0.1")]),
+    ("x\t1,2,3\t4,5,6", [("OSIM807", 1, "error", "a row needs a time")]),
+    # It rejects all others.
+    ("0.1\t1,23\t4,5,6", [("OSIM806", 5, "error", "'a' has 2 numbers and needs 3: OpenSim rejects")]),
+    ("0.1\t1,2,3\t4,5,", [("OSIM806", 11, "error", "'b' has 2 numbers and needs 3")]),
+    ("0.1\t1,2,3\t4,5,6,7", [("OSIM806", 11, "error", "'b' has 4 numbers and needs 3")]),
+    ("0.1\t \t4,5,6", [("OSIM806", 6, "error", "'a' is empty and needs 3")]),
+    ("0.1\t\t1,2,3\t4,5,6", [("OSIM806", 12, "error", "4 cells and needs 3")]),
+    ("0.1\t1,2\t,3\t4,5,6", [("OSIM806", 12, "error", "4 cells and needs 3")]),
+    ("\t0.1\t1,2,3\t4,5,6", [("OSIM806", 12, "error", "4 cells and needs 3")]),
+    ("0.1 1,2,3 4,5,6", [("OSIM806", 16, "error", "1 cell and needs 3; blanks separate them, and tabs must")]),
+    ("0.1\t1,2,3", [("OSIM806", 10, "error", "2 cells and needs 3")]),
+    ("  ", [("OSIM806", 1, "error", "1 cell and needs 3")]),
+    ("0.\t1,2,3\t4,5,6", [("OSIM808", 1, "error", "0 repeats that of the row before")]),
+    ("0.1\t1,2,3\t4,5,6\n\n0.2\t1,2,3\t4,5,6", [("OSIM806", 1, "error", "a blank line ends the table")]),
+]  # fmt: skip
+"""Rows of two vectors, and the findings: code, column, severity and words of the message."""
+
+
+@pytest.mark.parametrize(("row", "findings"), ROWS_OF_VECTORS)
+@pytest.mark.parametrize("version", [1, 3])
+def test_rows_of_vectors_are_judged_as_opensim_reads_them(
+    tmp_path: Path, row: str, findings: list[tuple[str, int, str, str]], version: int
+) -> None:
+    file = tmp_path / "markers.sto"
+    file.write_text(
+        f"DataType=Vec3\nversion={version}\nendheader\ntime\ta\tb\n0\t1,2,3\t4,5,6\n{row}\n"
+    )
+    result = [
+        (finding.code, finding.column, str(finding.severity), finding.message)
+        for finding in validate(file).findings
+    ]
+    assert [entry[:3] for entry in result] == [entry[:3] for entry in findings]
+    assert all(words in entry[3] for entry, (*_, words) in zip(result, findings, strict=True)), (
+        result
+    )
+
+
+def test_blanks_between_labels_of_vectors_are_an_error(tmp_path: Path) -> None:
+    file = tmp_path / "markers.sto"
+    file.write_text("DataType=Vec3\nversion=3\nendheader\ntime a\n0\t1,2,3\n")
+    (finding,) = validate(file).findings
+    assert (finding.code, str(finding.severity)) == ("OSIM80407", "error")
+
+
+def test_an_empty_line_before_rows_of_vectors_loses_all(tmp_path: Path) -> None:
+    file = tmp_path / "markers.sto"
+    file.write_text("DataType=Vec3\nversion=3\nendheader\ntime\ta\n\n0\t1,2,3\n")
+    (finding,) = validate(file).errors
+    assert (finding.code, finding.line) == ("OSIM806", 5) and "1 row" in finding.message
 
 
 def test_a_last_time_far_before_the_first_is_no_traceback(tmp_path: Path) -> None:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import re
 from itertools import pairwise
+from math import isfinite
 
 from osimlite.base.patterns import compile_later
 from osimlite.base.text import format_count
 from osimlite.io.document.source import Position
 from osimlite.io.tables.headers import MAX_TIME_S
+from osimlite.io.tables.vector_rows import parse_leading_number, split_vector
 from osimlite.lint.diagnostic import Edit, Fix
 from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, rule
 from osimlite.lint.table import Table
@@ -53,7 +55,9 @@ def report_ragged_row(table: Table, report: FindingCollector) -> None:
 
     OpenSim's older reader takes missing cells from the next line: from there on all numbers are in
     the wrong columns. The newer reader rejects the file. In marker files and tables of version 2
-    and 3 a blank line ends the table, and the rows after it are lost without a message.
+    and 3 a blank line ends the table, and the rows after it are lost without a message. In tables
+    of vectors (`DataType=Vec3` and others) one tab separates two cells, and OpenSim rejects the
+    table if a cell has too few or too many numbers.
 
     ```sto
       knee
@@ -69,9 +73,17 @@ def report_ragged_row(table: Table, report: FindingCollector) -> None:
     ```
     """
     rows = table.rows
-    for fault in rows.select("row", "comment", "blank"):
+    for fault in rows.select("row", "vector", "comment", "blank"):
         position = Position(fault.line, fault.column, fault.length)
-        if fault.kind == "row":
+        if fault.kind == "vector":
+            count = len(split_vector(fault.text))
+            problem = f"has {format_count(count, 'number')}" if count else "is empty"
+            report(
+                f"the cell of column '{table.label_of(fault.number)}' {problem} and needs "
+                f"{table.parts}: OpenSim rejects the table{fault.describe_repeats()}",
+                at=position,
+            )
+        elif fault.kind == "row":
             # A tab too many at the end of each line is what several programs write.
             fix = (
                 _remove_last_tabs(table, rows.cells)
@@ -140,7 +152,7 @@ def report_not_a_number(table: Table, report: FindingCollector) -> None:
 
     At the first such cell OpenSim's older reader (version 1 or none) stops: the cell becomes 0, the
     rest of its row repeats the row before, and all later rows are lost, without a message. The
-    newer reader reads NaN (a warning).
+    newer reader reads NaN, or the number at the beginning of the cell (a warning).
 
     ```sto
       knee
@@ -162,7 +174,11 @@ def report_not_a_number(table: Table, report: FindingCollector) -> None:
         elif table.is_markers:
             consequence = "OpenSim treats the marker as not seen"
         elif table.is_strict:
-            consequence = "OpenSim reads it as NaN"
+            # The newer reader ignores what follows a number.
+            value = parse_leading_number(fault.text)
+            consequence = (
+                f"OpenSim reads {value:g}" if isfinite(value) else "OpenSim reads it as NaN"
+            )
         # The older reader stops at a word, and fills what is left with zeros.
         else:
             lost_count = max(0, end - fault.line)
@@ -187,9 +203,9 @@ def report_time_order(table: Table, report: FindingCollector) -> None:
     Reports rows with the time of the row before, rows that go back in time, and times beyond 1e25 s.
 
     Of two rows with one time OpenSim keeps the second, without a message; where time goes back the
-    rows before are lost, or the tool stops. OpenSim rejects a marker file with either. A repeated
-    time in a storage file is a warning, and in the last row an info: OpenSim ends some of its
-    results so.
+    rows before are lost, or the tool stops. OpenSim rejects a marker file or a table of vectors
+    with either. A repeated time in another storage file is a warning, and in the last row an info:
+    OpenSim ends some of its results so.
 
     ```sto
       knee
@@ -219,7 +235,7 @@ def report_time_order(table: Table, report: FindingCollector) -> None:
         # Repeated times are kept apart from times that go back, which no spline can be put through.
         severity = (
             None
-            if fault.number or table.is_markers
+            if fault.number or table.is_markers or table.parts > 1
             else INFO
             if fault.line == last_line
             else WARNING

@@ -481,7 +481,7 @@ def report_column_label(table: Table, report: FindingCollector) -> None:
     The first column of a storage file must be `time`, in lower case. Every column needs a unique
     label. Labels of markers must not contain blanks, every marker needs one, and the columns of
     frame and time must be labelled `Frame#` and `Time`. In a storage file of version 2 or 3 tabs
-    must separate the labels (a warning).
+    must separate the labels (a warning; in tables of vectors an error).
 
     Without a column `time` OpenSim rejects the table. Of two columns with one label it finds the
     first (a warning), and reads no loads from them; it rejects a file with two markers of one name.
@@ -547,12 +547,20 @@ def report_column_label(table: Table, report: FindingCollector) -> None:
                 fault="time-not-first",
             )
     elif header.is_strict and labels[1:] and not header.has_tabs:
-        report(
-            f"blanks separate the columns of a table of version {header.form}: OpenSim's newer "
-            "tools reject it",
-            at=labels[1].at,
-            fault="blanks-between-labels",
-        )
+        if header.parts > 1:
+            report(
+                f"blanks separate the columns of a table of {header.kind}: OpenSim rejects it",
+                at=labels[1].at,
+                severity=ERROR,
+                fault="blanks-between-labels",
+            )
+        else:
+            report(
+                f"blanks separate the columns of a table of version {header.form}: OpenSim's newer "
+                "tools reject it",
+                at=labels[1].at,
+                fault="blanks-between-labels",
+            )
     positions_by_label: dict[str, list[Position]] = {}
     for label in labels:
         positions_by_label.setdefault(label.text, []).append(label.at)
