@@ -79,7 +79,8 @@ _UNUSED: Final[dict[str, dict[str, str]]] = {
     },
     "Component": {"VisibleObject": "OpenSim 4 draws by attached_geometry and Appearance"},
     "Thelen2003Muscle": {
-        tag: "this muscle has never had it" for tag in ("Vmax", "Vmax0", "damping", "muscle_model")
+        tag: "this class of muscles has never had this property"
+        for tag in ("Vmax", "Vmax0", "damping", "muscle_model")
     },
     "Millard2012EquilibriumMuscle": {
         tag: "this class of muscles has no such property"
@@ -90,10 +91,12 @@ _UNUSED: Final[dict[str, dict[str, str]]] = {
         )
     },
     "ForceSet": {"datafile": "ExternalLoads name the file with the forces"},
-    "Joint": {"use_euler_angles": "a CustomJoint or GimbalJoint has angles anyway"},
-    "Schutte1993Muscle_Deprecated": {"force_velocity_curve": "its law has no such curve"},
+    "Joint": {"use_euler_angles": "a CustomJoint or GimbalJoint uses angles anyway"},
+    "Schutte1993Muscle_Deprecated": {
+        "force_velocity_curve": "this class of muscles has no such curve"
+    },
     "Coordinate": {
-        tag: "a spring or a limit force does that"
+        tag: "use a spring or a CoordinateLimitForce instead"
         for tag in (
             "stiffness",
             "restraint_function",
@@ -103,7 +106,9 @@ _UNUSED: Final[dict[str, dict[str, str]]] = {
             "keys",
         )
     },
-    "SmoothSphereHalfSpaceForce": {"derivative_smoothing": "no release has read it"},
+    "SmoothSphereHalfSpaceForce": {
+        "derivative_smoothing": "no release of OpenSim has ever read this element"
+    },
     # OpenSim 2 wrote these into its setups.
     "Tool": {"input_directory": "write the folder into the names of the files"},
     "InverseKinematicsTool": {

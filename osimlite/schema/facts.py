@@ -11,7 +11,7 @@ from osimlite.base.named_tuples import NamedTuple
 REFUSED: Final = "OpenSim rejects the model"
 TOUCHING: Final = "forces and motion become NaN as soon as the surfaces touch"
 NAN: Final = "accelerations become NaN, without a message"
-STOPS: Final = "OpenSim cannot take one step"
+STOPS: Final = "OpenSim cannot take even one time step"
 STUCK: Final = (
     "OpenSim finds no equilibrium for the muscle and fails when it computes accelerations"
 )

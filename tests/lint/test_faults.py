@@ -66,7 +66,8 @@ def test_the_name_of_a_part_of_a_probe_may_not_be_blank():
         </Umberger2010MuscleMetabolicsProbe></objects></ProbeSet></Model></OpenSimDocument>"""
     (finding,) = validate(Source(text.encode()), select="OSIM303").findings
     assert (
-        "is blank, expected that of a Muscle; OpenSim disables the whole probe" in finding.message
+        "is blank, expected the name of a Muscle; OpenSim disables the whole probe"
+        in finding.message
     )
 
 

@@ -41,7 +41,7 @@ def report():
 def test_full(report):
     assert render(report) == dedent("""\
         m.osim:3:12: warning OSIM505 strange-gravity
-          gravity is 9806 m/s^2; is it in millimetres?
+          gravity is 9806 m/s^2; is it in mm/s^2?
           |
         3 | <gravity>0 -9806 0</gravity>
           |          ^^^^^^^^^

@@ -28,7 +28,7 @@ SECONDS = 90 if "OSIMLITE_BREAKAGES" not in os.environ else 3600
 SILENT = {"OSIM108", "OSIM311", "OSIM322", "OSIM406", "OSIM410", "OSIM414", "OSIM607"}
 SILENTLY = ("OpenSim disables the whole probe", "OpenSim welds a hidden body between them")
 # OpenSim reads undefined memory in these cases, so that its verdict changes from run to run.
-UNDEFINED = ("OpenSim reads beyond the end of the list", "OpenSim reads memory that it has not set")
+UNDEFINED = ("OpenSim reads beyond the end of the list", "OpenSim reads an undefined number")
 # Simbody's messages when all references are valid but the model cannot take its initial pose:
 # constraints that contradict each other, or a cable without a way around its obstacles.
 ASSEMBLY = ("projectQ", "CableSpan")

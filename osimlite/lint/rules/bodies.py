@@ -29,7 +29,7 @@ SLACK = Threshold(
     "inertia-slack",
     1e-6,
     "",
-    "largest accepted relative error of an inertia, because files have rounded numbers",
+    "relative error that is accepted in an inertia, because numbers in files are rounded",
 )
 GYRATION = Threshold(
     "largest-radius-of-gyration", 5.0, "m", "largest plausible radius of gyration of a body"
@@ -85,9 +85,9 @@ def report_impossible_inertia(subject: Subject, report: FindingCollector) -> Non
             excess = 100 * (large / (smallest + middle) - 1) if smallest + middle > 0 else math.inf
             report(
                 f"the inertia of {describe_object(body)} is impossible: its largest principal "
-                f"moment, {format_quantity(large)}, is more than the sum of the others, "
-                f"{format_quantity(smallest + middle)}"
-                + (f", by {excess:.3g} %" if math.isfinite(excess) else "")
+                f"moment, {format_quantity(large)}, is "
+                + (f"{excess:.3g} % " if math.isfinite(excess) else "")
+                + f"larger than the sum of the other two, {format_quantity(smallest + middle)}"
                 + _describe_closest(body),
                 body,
                 tag="inertia",
@@ -216,9 +216,8 @@ def report_mass_out_of_proportion(subject: Subject, report: FindingCollector) ->
         radius = math.sqrt(max(moments[2], 0) / body.mass)
         if radius > widest:
             report(
-                f"the inertia of {describe_object(body)} would need its "
-                f"{format_quantity(body.mass, 'kg')} to be {format_quantity(radius, 'm')} from "
-                "its mass center; is it in kg mm^2?",
+                f"with its inertia, all {format_quantity(body.mass, 'kg')} of {describe_object(body)} would "
+                f"be {format_quantity(radius, 'm')} from the mass center; is the inertia in kg mm^2?",
                 # kg mm^2 are 1e-6 kg m^2.
                 body,
                 tag="inertia",
@@ -238,8 +237,8 @@ def _describe_closest(body: Body) -> str:
     # Each product stands in the matrix twice.
     distance, size = (math.hypot(*matrix, *matrix[3:]) for matrix in (differences, body.inertia))
     return (
-        f"; the closest possible inertia is {' '.join(f'{number:.4g}' for number in nearest)}, a "
-        f"change by {100 * distance / size:.2g} %"
+        f"; the closest possible inertia, {' '.join(f'{number:.4g}' for number in nearest)}, "
+        f"differs by {100 * distance / size:.2g} %"
     )
 
 

@@ -55,10 +55,12 @@ def report_unknown_class(subject: Subject, report: FindingCollector) -> None:
         # Classes of plug-ins are not misspelt.
         plugin = find_plugin(note.word)
         if plugin:
-            message += f"; it belongs to {plugin}: load that first; nothing in it was checked"
+            message += f"; the class belongs to {plugin}: load it first; osimlite did not check this object"
         elif suggestion is None or suggestion.lower() != note.word.lower():
             # The class differs in letter case only: nothing else can be meant.
-            message += "; if it belongs to a plug-in, load that first: nothing in it was checked"
+            message += (
+                "; if it belongs to a plug-in, load that first; osimlite did not check this object"
+            )
         is_same_word = suggestion is not None and suggestion.lower() == note.word.lower()
         fix = rename_tag(subject.source, note.number, suggestion, safe=is_same_word)
         report(
@@ -175,7 +177,7 @@ def report_wrong_class(subject: Subject, report: FindingCollector) -> None:
         kinds = note.spec.accepts.__name__
         home = find_set(note.value)
         description, consequence = _describe_consequence(subject, note)
-        home_hint = f"; it belongs in the {home}" if home else ""
+        home_hint = f"; the {note.word} belongs in the {home}" if home else ""
         holder = (
             f"{describe_object(owner)}: {note.spec.tag}"
             if note.spec.tag != "objects"
@@ -323,7 +325,7 @@ def _describe_consequence(subject: Subject, note: Note) -> tuple[str, Consequenc
     # With the name of the property OpenSim tries to make this object, and fails.
     if attributes is None or ("name" in attributes and attributes["name"].value == spec.tag):
         return "rejects the file", REFUSES
-    return "leaves the object out, and fails where it needs one", None
+    return "leaves the object out, and fails as soon as it needs one", None
 
 
 def find_set(cls: type[Object] | None) -> str | None:

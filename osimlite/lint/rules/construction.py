@@ -75,7 +75,10 @@ def report_unmet_constraint(subject: Subject, report: FindingCollector) -> None:
     """
     for obstacle in _select_unreported(subject, report, Stage.ASSEMBLY):
         _report_obstacle(
-            subject, report, obstacle, f"{obstacle.message}: OpenSim cannot start from it"
+            subject,
+            report,
+            obstacle,
+            f"{obstacle.message}: OpenSim cannot start a simulation from this pose",
         )
 
 
@@ -204,7 +207,7 @@ def report_no_acceleration(subject: Subject, report: FindingCollector) -> None:
     for function in _find_undefined_formulas(subject):
         report(
             f"expression of {subject.describe_part(function)} is '{function.expression}', which is "
-            "no finite number at 0 s, so every acceleration is NaN or infinite",
+            "not a finite number at 0 s: every acceleration is NaN or infinite",
             function,
             tag="expression",
         )
@@ -271,7 +274,11 @@ def report_not_computed(subject: Subject, report: FindingCollector) -> None:
             continue
         groups.setdefault(type(item), []).append(obstacle)
     for first, *similar in groups.values():
-        similar_note = f"; {format_count(len(similar), 'other')} of its class" if similar else ""
+        similar_note = (
+            f"; the same for {format_count(len(similar), 'more component')} of its class"
+            if similar
+            else ""
+        )
         component = subject.tree.by_path.get(first.path)
         reason = first.message.partition(";")[0]
         if component is not None and reason.startswith(f"'{first.path}' ("):

@@ -82,7 +82,7 @@ def _explain_missing_contact(subject: Subject, force: Component, uses: list[Use]
     pairs = [*combinations(zip(resolved_surfaces, bases, strict=True), 2)]
     # Surfaces of one body do not move against each other.
     if all(first[1] is second[1] for first, second in pairs):
-        return f"surfaces of {describe_object(bases[0])} alone" if bases[0] is not None else ""
+        return f"only surfaces of {describe_object(bases[0])}" if bases[0] is not None else ""
     if any(
         first[1] is not second[1]
         and _can_meet(kind, type(first[0]).__name__, type(second[0]).__name__)

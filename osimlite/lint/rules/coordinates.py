@@ -40,7 +40,7 @@ UNBOUNDED = Threshold(
     "unbounded-angle",
     1000.0,
     "rad",
-    "a bound of a range this large means no limit",
+    "a range with a bound this large or larger has no limit",
 )
 _ASSEMBLY_ACCURACY = 1e-10
 """Difference from the default value (rad or m) up to which OpenSim 4.6 takes a locked coordinate."""

@@ -173,8 +173,8 @@ def _report_lost_transition(subject: Subject, report: FindingCollector, force: A
         )
         if math.isfinite(limit) and is_lost:
             report(
-                f"transition of {subject.describe_part(force)} is {force.transition:g}, too "
-                f"small to change its {name} of {limit:g} when it is added: OpenSim rejects the model",
+                f"transition of {subject.describe_part(force)} is {force.transition:g}, "
+                f"nearly 0 compared with its {name} of {limit:g}: OpenSim rejects the model",
                 force,
                 consequence=REFUSES,
                 tag="transition",
@@ -232,7 +232,7 @@ def _report_short_fibers(subject: Subject, report: FindingCollector) -> None:
         fails = length <= SHORTEST_FIBER
         report(
             f"optimal_fiber_length of {describe_object(muscle)} is {length:g} m: OpenSim "
-            f"{'does' if fails else 'may'} not find the velocity of so short a fiber",
+            f"{'fails' if fails else 'may fail'} to find the velocity of such a short fiber",
             muscle,
             tag="optimal_fiber_length",
             consequence=FAILS,
@@ -253,7 +253,9 @@ def _report_size(
     """Report a number that is too large or too small."""
     value = item.__dict__[spec.name]
     power_note = (
-        f"; its powers are {'infinite' if adjective == 'large' else 'zero'}" if is_error else ""
+        f"; powers of this number are {'infinite' if adjective == 'large' else 'zero'}"
+        if is_error
+        else ""
     )
     report(
         f"{subject.describe_property(item, spec)} is {format_value(value)}: no physical "
@@ -332,8 +334,8 @@ class DomainVerdict(NamedTuple):
 
 
 _NAN_CONSEQUENCE = "everything computed from it becomes NaN, without a message"
-_DRAWN_CONSEQUENCE = "it cannot be drawn"
-_BOUND_CONSEQUENCE = "whatever uses it as a bound fails"
+_DRAWN_CONSEQUENCE = "the object cannot be drawn"
+_BOUND_CONSEQUENCE = "everything that uses this bound fails"
 _FILE_REFUSED = "OpenSim rejects the file"
 _DECLARED_CONSEQUENCES = {
     _FILE_REFUSED: REFUSES,
@@ -433,7 +435,7 @@ def _describe_obstacle_size(name: str, numbers: Sequence[float]) -> tuple[str, b
         The consequence, and whether it is a failure.
     """
     if name == "torus_radius":
-        return (REFUSED, True) if min(numbers) < 0.0 else ("it is a sphere", False)
+        return (REFUSED, True) if min(numbers) < 0.0 else ("the torus becomes a sphere", False)
     if name == "radius":
         # Whether OpenSim starts with a radius of 0 depends on the rest of the model.
         meaning = "the path around it has no meaning"

@@ -81,7 +81,7 @@ def report_unsorted_abscissae(subject: Subject, report: FindingCollector) -> Non
                     if is_disabled or rejected
                     else ("the function is constant there", RUNS)
                     if level
-                    else ("the function values are wrong", RUNS)
+                    else ("OpenSim computes wrong values", RUNS)
                 )
                 relation = "repeats" if current_x == previous_x else "is smaller than"
                 word, nth = subject.word_at(function, "x", index)
@@ -172,7 +172,7 @@ def report_too_few_points(subject: Subject, report: FindingCollector) -> None:
             )
             description, consequence = _describe_refusal(subject, function)
             report(
-                f"half_order of {subject.describe_part(function)} is {count_text}: {description}; 2 is a "
+                f"half_order of {subject.describe_part(function)} is {count_text}: {description}; 2 gives a "
                 "cubic spline",
                 function,
                 consequence=consequence,
@@ -180,14 +180,14 @@ def report_too_few_points(subject: Subject, report: FindingCollector) -> None:
                 severity=severity,
             )
         elif len(function.x) < min_count:
-            description, consequence = "it has no value", None
+            description, consequence = "the function has no value", None
             if is_disabled or is_a(function, "GCVSpline"):
                 description, consequence = _describe_refusal(subject, function)
             elif is_a(function, "SimmSpline"):
                 consequence = NAN
             count_text = format_count(len(function.x), "point")
             report(
-                f"{subject.describe_part(function)} has {count_text} and needs {min_count}: {description}",
+                f"{subject.describe_part(function)} has {count_text}, but needs {min_count}: {description}",
                 function,
                 consequence=consequence,
                 tag="x",
@@ -248,7 +248,7 @@ def report_coefficient_count(subject: Subject, report: FindingCollector) -> None
             consequence = UNUSED if is_disabled else "OpenSim fails when it needs a value"
             report(
                 f"{subject.describe_part(polynomial)} has {format_count(coefficient_count, 'coefficient')}; "
-                f"{format_count(dimension, 'variable')} to order {order} need {expected_count}: {consequence}",
+                f"{format_count(dimension, 'variable')} and order {order} need {expected_count}: {consequence}",
                 polynomial,
                 consequence=FAILS,
                 tag="coefficients",
@@ -266,7 +266,7 @@ def report_coefficient_count(subject: Subject, report: FindingCollector) -> None
                 if coefficient_count < expected_count
                 else "OpenSim ignores the rest"
                 if coordinate_count
-                else "OpenSim reads memory that it has not set"
+                else "OpenSim reads an undefined number"
             )
             report(
                 f"the LinearFunction of {describe_object(owner)} has "
@@ -365,7 +365,7 @@ def report_missing_function(subject: Subject, report: FindingCollector) -> None:
             if isinstance(functions, FunctionSet) and len(functions.objects) not in (0, 3):
                 count_text = format_count(len(functions.objects), "function")
                 report(
-                    f"{name} of {describe_object(force)} has {count_text}, not three or none: OpenSim "
+                    f"{name} of {describe_object(force)} has {count_text}, expected three or none: OpenSim "
                     "rejects the file",
                     functions,
                     consequence=REFUSES,
@@ -430,7 +430,7 @@ def _find_linear_functions(subject: Subject) -> Iterator[tuple[Object, int, Line
             yield owner, coordinate_count, function
 
 
-UNUSED: Final = "its owner is disabled, so OpenSim does not compute it"
+UNUSED: Final = "the force or controller is disabled, so OpenSim does not compute this"
 """Consequence, in findings, of a fault in a function of a disabled force or controller."""
 
 

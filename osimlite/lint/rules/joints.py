@@ -163,7 +163,7 @@ def report_shared_coordinate_name(subject: Subject, report: FindingCollector) ->
         if users:
             message += (
                 f"; {join_words(dict.fromkeys(users), max_count=3)} "
-                f"{'uses' if len(users) == 1 else 'all use'} that one"
+                f"{'uses' if len(users) == 1 else 'all use'} that coordinate"
             )
         report(message, component, attribute="name", severity=None if users else WARNING)
 

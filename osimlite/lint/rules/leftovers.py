@@ -67,7 +67,7 @@ def report_unknown_attribute(subject: Subject, report: FindingCollector) -> None
     for element_index, tag, attribute_name in _find_ignored_attributes(subject):
         is_of_xml = _is_xml_attribute(attribute_name)
         report(
-            f"OpenSim ignores the attribute '{attribute_name}' of <{tag}>; it is lost when the model "
+            f"OpenSim ignores the attribute '{attribute_name}' of <{tag}>; osimlite loses it when the model "
             "is written",
             at=subject.attribute_name(element_index, attribute_name),
             severity=INFO if is_of_xml else WARNING,

@@ -54,8 +54,8 @@ def report_marker_units(table: Table, report: FindingCollector) -> None:
             None,
         )
         report(
-            f"the markers of one frame would be {float(f'{usual * unit:.3g}'):g} m apart in the "
-            f"units of the file, '{units.value.text}'",
+            f"the markers of a frame are spread over {float(f'{usual * unit:.3g}'):g} m if they are in "
+            f"the units of the file, '{units.value.text}'",
             at=units.value.at,
             suggestion=likely_unit,
         )
@@ -106,7 +106,7 @@ def report_marker_gap(table: Table, report: FindingCollector) -> None:
     for label in [
         label for number, label in enumerate(table.labels) if number in table.rows.unseen
     ]:
-        report(f"no frame has the marker '{label.text}'", at=label.at, severity=INFO)
+        report(f"the marker '{label.text}' is missing in all frames", at=label.at, severity=INFO)
 
 
 @rule("OSIM813", "frame-number", severity=INFO, about="table")

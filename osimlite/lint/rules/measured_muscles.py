@@ -12,8 +12,8 @@ OFF = Threshold(
     "off-equilibrium",
     0.1,
     "",
-    "largest accepted distance from equilibrium: fiber length in optimal lengths, tendon force "
-    "in max_isometric_force",
+    "largest accepted difference from equilibrium: of the fiber length, in optimal fiber "
+    "lengths, and of the tendon force, in max_isometric_force",
 )
 
 

@@ -15,7 +15,7 @@ OFF = Threshold(
     "wrapping-error",
     0.001,
     "m",
-    "largest accepted difference between OpenSim's path length and that along geodesics",
+    "largest accepted difference between OpenSim's path length and the length along geodesics",
 )
 
 
@@ -84,7 +84,7 @@ JUMP = Threshold(
     "path-jump",
     0.001,
     "m",
-    "largest accepted jump of a path length; jumps below 0.001 are never searched",
+    "largest accepted jump of a path length; the rule does not search for jumps below 0.001 m",
 )
 
 
@@ -170,7 +170,7 @@ MADE_UP = Threshold(
     "made-up-path",
     0.001,
     "m",
-    "largest accepted motion of a path point by extrapolated functions",
+    "largest accepted distance by which extrapolated functions move a path point",
 )
 RATE = Threshold(
     "resting-point",
@@ -235,14 +235,14 @@ def report_moving_point_range(subject: Subject, report: FindingCollector) -> Non
         if point.displacement >= made_up:
             report(
                 f"the location functions of {names} end {end.format_value(point.beyond, 3)} "
-                f"before the range of '{end.coordinate}': OpenSim extrapolates them and moves the "
-                f"point by {1000.0 * point.displacement:.3g} mm up to {end}",
+                f"before the range does, at {end}: OpenSim extrapolates them, which "
+                f"moves the point by {1000.0 * point.displacement:.3g} mm",
                 owner,
             )
         else:
             report(
                 f"{names} does not move outside the range of '{end.coordinate}' in OpenSim, but "
-                "OpenSim computes path speeds and moment arms there as if it moved, by "
+                "OpenSim computes path speeds and moment arms there as if the point moved, by "
                 f"{1000.0 * point.rate:.3g} mm per {end.unit or 'unit'} at {end}; keep the "
                 "coordinate in its range with a CoordinateLimitForce",
                 owner,

@@ -94,15 +94,14 @@ def report_impossible_bounds(setup: Setup, report: FindingCollector) -> None:
         starts, ends = phase.time_initial_bounds.bounds, phase.time_final_bounds.bounds
         if starts and ends and ends[-1] < starts[0]:
             report(
-                f"the phase ends at {ends[-1]:g} s at the latest, and begins at {starts[0]:g} s "
-                "at the earliest",
+                f"the phase must end at {ends[-1]:g} s or earlier, but must begin at {starts[0]:g} s or later",
                 phase.time_final_bounds,
                 tag="bounds",
             )
         for infos in (phase.state_infos, phase.control_infos, phase.input_control_infos):
             for info in _find_repeated(infos):
                 report(
-                    f"'{info.name}' already has bounds: these replace them",
+                    f"'{info.name}' already has bounds: OpenSim uses these instead",
                     info,
                     attribute="name",
                     severity=WARNING,
@@ -192,7 +191,7 @@ def report_study_data(setup: Setup, report: FindingCollector) -> None:
                     tool_time = getattr(item, time)
                     if tool_time is not None and not first <= tool_time <= last:
                         report(
-                            f"'{name}' has {first!r} to {last!r} s, not {tool_time!r} s: OpenSim "
+                            f"'{name}' has times from {first!r} to {last!r} s, but {time} is {tool_time!r} s: OpenSim "
                             "rejects the tool",
                             item,
                             tag=time,
@@ -255,11 +254,11 @@ def _describe_guess_fault(setup: Setup, tree: Tree, guess: Table) -> str:
         None,
     )
     if faulty is not None:
-        return f"must say how many of its columns are {faulty} (num_{faulty}=...)"
+        return f"must say in its header how many of its columns are {faulty} (num_{faulty}=...)"
     total = sum(int(number) for number in counts_by_kind.values() if number.isdecimal())
     count = len(guess.columns)
     if total != count:
-        return f"has {count} columns, and {total} by the counts in its header"
+        return f"has {count} columns, but the counts in its header add up to {total}"
     states = find_variables(tree, "state variable")
     # OpenSim reads the first columns as states, by their number.
     faulty = next(
@@ -273,7 +272,7 @@ def _describe_guess_fault(setup: Setup, tree: Tree, guess: Table) -> str:
     return (
         ""
         if faulty is None
-        else f"has '{faulty}' among its first columns, which are those of states"
+        else f"has '{faulty}' among its first columns, where OpenSim expects the states"
     )
 
 

@@ -188,8 +188,8 @@ def report_shared_time_constants(subject: Subject, report: FindingCollector) -> 
             declared_value, used_value = getattr(muscle, tag), getattr(first_muscle, tag)
             if declared_value != used_value:
                 report(
-                    f"{tag} of {describe_object(muscle)} is {format_quantity(declared_value)}, and OpenSim "
-                    f"computes with {format_quantity(used_value)}, that of {describe_object(first_muscle)}",
+                    f"{tag} of {describe_object(muscle)} is {format_quantity(declared_value)}, but OpenSim "
+                    f"computes with {format_quantity(used_value)}, the value of {describe_object(first_muscle)}",
                     muscle,
                     tag=tag if tag in muscle.model_fields_set else None,
                 )

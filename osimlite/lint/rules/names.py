@@ -131,10 +131,10 @@ def report_illegal_name(subject: Subject, report: FindingCollector) -> None:
                 is_used = has_inner_space and subject.source.text.count(name) > 1
                 frame = subject.source.spans[change.number].tag in ("Body", "Ground")
                 consequence = f"OpenSim changes it to '{better}'" + (
-                    ", but not where others use it" if is_used else ""
+                    ", but keeps the white space where others use the name" if is_used else ""
                 )
                 if users:
-                    consequence = f"OpenSim changes it to '{better}', but not in <{users[0]}>, and refuses the file"
+                    consequence = f"OpenSim changes it to '{better}', but not in <{users[0]}>, and rejects the file"
                 if frame:
                     consequence = (
                         "OpenSim creates frames of that name for the joints and rejects them"

@@ -76,7 +76,7 @@ _NOT_READ = frozenset(("unknown-tag", "wrong-name", "wrong-class", "unknown-clas
 
 
 DISTANCE = Threshold(
-    "path-point-distance", 0.0, "m", "points of a path this near to each other count as one"
+    "path-point-distance", 0.0, "m", "points of a path at this distance or nearer count as one"
 )
 
 

@@ -28,19 +28,19 @@ BEYOND = Threshold(
     "limit-beyond-range",
     0.0,
     "of the range",
-    "share of the range by which a limit may lie outside it",
+    "a limit may lie outside the range by this share of the range",
 )
 INSIDE = Threshold(
     "limit-inside-range",
     0.25,
     "of the range",
-    "share of the range by which a limit may lie inside it",
+    "a limit may lie inside the range by this share of the range",
 )
 UNLIMITED = Threshold(
     "unlimited-range",
     4 * math.pi,
     "rad",
-    "a wider range means no limit, or is in degrees",
+    "the rule ignores wider ranges: they mean no limit, or are in degrees",
 )
 
 
@@ -67,7 +67,7 @@ def report_strange_gravity(subject: Subject, report: FindingCollector) -> None:
         return
     if size > subject.config.value_of(GRAVITY):
         # 9.81 m/s^2 are 9810 mm/s^2.
-        unit = "; is it in millimetres?" if 9000 < size < 11000 else ""
+        unit = "; is it in mm/s^2?" if 9000 < size < 11000 else ""
         report(f"gravity is {format_quantity(size, 'm/s^2')}{unit}", model, tag="gravity")
     # Numbers of the order of rounding, relative to the gravity, are no direction.
     elif model.gravity[1] > 1e-9 * size and model.gravity[1] > 0.9 * size:
@@ -102,7 +102,7 @@ def report_friction_order(subject: Subject, report: FindingCollector) -> None:
                 f"{format_quantity(material.static_friction)}, is smaller than dynamic friction, "
                 f"{format_quantity(material.dynamic_friction)}"
                 + (
-                    "; it is less than half of it, so friction accelerates slow sliding"
+                    "; below half of the dynamic friction, friction accelerates slow sliding"
                     if _drives_sliding(subject, material)
                     else ""
                 ),
@@ -131,7 +131,7 @@ def report_limits_swapped(subject: Subject, report: FindingCollector) -> None:
             report(
                 f"the upper limit of {describe_object(force)}, "
                 f"{format_quantity(force.upper_limit)}, is below the lower limit, "
-                f"{format_quantity(force.lower_limit)}: both act at once",
+                f"{format_quantity(force.lower_limit)}: between them both springs act at once",
                 force,
                 tag="upper_limit",
             )

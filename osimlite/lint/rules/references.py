@@ -115,7 +115,7 @@ def report_missing_reference(subject: Subject, report: FindingCollector) -> None
         use = broken.use
         if use.spec.name == "name":
             report(
-                f"the name of {add_article(type(use.holder).tag)} is blank, expected that of "
+                f"the name of {add_article(type(use.holder).tag)} is blank, expected the name of "
                 f"{add_article(use.reference.target)}; OpenSim disables the whole probe",
                 use.holder,
                 attribute="name",

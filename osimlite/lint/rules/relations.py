@@ -148,7 +148,7 @@ def _check_function_based_path(path: Any, owner: Any) -> Iterator[Contradiction]
         if result is not None and result != expected_count:
             yield (
                 tag,
-                f"a function of its {tag} takes {format_count(result, 'argument')} instead of {expected_count}",
+                f"a function in {tag} takes {format_count(result, 'argument')}, expected {expected_count}",
             )
 
 

@@ -57,7 +57,7 @@ def report_scale_factor(setup: Setup, report: FindingCollector) -> None:
         for factor in dict.fromkeys(scale.scales) if scale.apply else ():
             if not _MIN_FACTOR <= factor <= _MAX_FACTOR:
                 report(
-                    f"{describe_object(scale)} scales {scale.segment} by {factor:g}",
+                    f"{describe_object(scale)} scales {scale.segment} by a factor of {factor:g}",
                     scale,
                     tag="scales",
                 )

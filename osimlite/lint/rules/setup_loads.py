@@ -72,7 +72,7 @@ def report_load_columns(setup: Setup, report: FindingCollector) -> None:
                 )
             if not force.appliesForce:
                 report(
-                    f"{describe_object(force)} does not act",
+                    f"{describe_object(force)} is disabled (appliesForce is false)",
                     force,
                     tag="appliesForce",
                     severity=INFO,
@@ -83,7 +83,7 @@ def report_load_columns(setup: Setup, report: FindingCollector) -> None:
                 force.point_identifier or not force.torque_identifier
             ):
                 report(
-                    f"{describe_object(force)} names no columns of a force: OpenSim rejects it",
+                    f"{describe_object(force)} has no force_identifier: OpenSim rejects it",
                     force,
                     tag="force_identifier",
                 )
@@ -122,7 +122,7 @@ def report_load_columns(setup: Setup, report: FindingCollector) -> None:
                 } == {"x", "y", "z"}:
                     report(
                         f"'{loads.datafile}' has {join_words(matching_columns)} in this order: OpenSim uses the "
-                        "first as x",
+                        "first of them as x",
                         force,
                         tag=tag,
                         severity=WARNING,
@@ -202,7 +202,7 @@ def report_load_place(setup: Setup, report: FindingCollector) -> None:
                 2, len(acting) // 4
             ):
                 report(
-                    f"the torque of {describe_object(force)} corresponds to its force at a "
+                    f"the torque of {describe_object(force)} is as large as the moment of its force at a "
                     f"distance of {max(sample.twist for sample in acting):.3g} m: is it in newton "
                     "millimetres, or about another point?",
                     force,

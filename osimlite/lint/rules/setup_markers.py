@@ -126,8 +126,8 @@ def report_marker_not_measured(setup: Setup, report: FindingCollector) -> None:
                         )
                     elif name in unseen_markers:
                         report(
-                            f"'{name}' is not seen in every row of '{scaler.marker_file}' that is "
-                            f"averaged: OpenSim ignores the whole measurement '{measurement.name}'",
+                            f"'{name}' is missing in some of the averaged rows of "
+                            f"'{scaler.marker_file}': OpenSim ignores the whole measurement '{measurement.name}'",
                             pair,
                             tag="markers",
                             word=str(name),

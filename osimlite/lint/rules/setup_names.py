@@ -226,7 +226,7 @@ def _look_up_controls(
             )
         elif follows and not control.is_model_control:
             report(
-                f"{describe_object(control)} bounds no control of the model: OpenSim fails",
+                f"{describe_object(control)} has is_model_control false, so it bounds no control: OpenSim fails",
                 control,
                 tag="is_model_control",
             )
@@ -281,7 +281,7 @@ def report_excluded_force(setup: Setup, report: FindingCollector) -> None:
         # Inverse dynamics with muscles computes what they leave, which is seldom meant.
         if not tool.forces_to_exclude and any(is_a(force, "Muscle") for force in forces.objects):
             report(
-                f"{describe_object(tool)} excludes no force: muscles are included",
+                f"{describe_object(tool)} excludes no force: muscles act, and their passive forces change the joint moments",
                 tool,
                 tag="forces_to_exclude",
             )
@@ -293,11 +293,14 @@ def report_excluded_force(setup: Setup, report: FindingCollector) -> None:
             or word in (groups or names)
         ):
             continue
-        hint = "; the model has groups, and OpenSim then looks at groups only"
         # If a model has groups, OpenSim compares with their names only.
+        reason = (
+            f"'{word}' is a force, but the model has groups of forces, and OpenSim then searches only them"
+            if word in names
+            else f"the model has no force or group of forces '{word}'"
+        )
         report(
-            f"the model has no force or group of forces '{word}'{hint if word in names else ''}: "
-            "OpenSim excludes nothing for it",
+            f"{reason}: OpenSim does not exclude '{word}'",
             use.holder,
             tag="forces_to_exclude",
             word=word,

@@ -36,7 +36,7 @@ def report_task_weight(setup: Setup, report: FindingCollector) -> None:
         applied = [task for task in select_members(tasks, "IKTask") if task.apply]
         if tasks.objects and not applied:
             report(
-                "no task of this set applies: OpenSim uses all markers, each with the weight 1",
+                "all tasks of this set are disabled: OpenSim uses all markers, each with the weight 1",
                 tasks,
                 severity=WARNING,
             )
@@ -163,8 +163,8 @@ def report_unreachable_task(setup: Setup, report: FindingCollector) -> None:
         ]
         if moving_locked:
             report(
-                f"{join_words(moving_locked)} {'is' if len(moving_locked) == 1 else 'are'} locked in the model, and "
-                f"moves in '{user.coordinate_file}'",
+                f"{join_words(moving_locked)} {'is' if len(moving_locked) == 1 else 'are'} locked in the model, but "
+                f"{'moves' if len(moving_locked) == 1 else 'move'} in '{user.coordinate_file}'",
                 user,
                 tag="coordinate_file",
             )

@@ -45,8 +45,8 @@ _FRAMES = {
 
 
 _FAULTS = """\
-01 time-count, error, in dynamics: A time range does not have two times. With fewer the tool fails, or reads memory that it
-has not set; of more OpenSim uses the first two.
+01 time-count, error, in dynamics: A time range does not have two times. With fewer times the tool fails, or reads
+an undefined time. Of more times OpenSim uses the first two.
 - <time_range>0</time_range>
 + <time_range>0 0.5</time_range>
 02 few-rows, error, in any: A motion has fewer than six rows. OpenSim needs at least six for its spline.
@@ -57,7 +57,7 @@ fails, writes tables without rows, or uses other times.
 - <time_range>0.5 0</time_range>
 + <time_range>0 0.5</time_range>
 04 too-short-for-control, error, in control: The time range of computed muscle control is too short. It needs 0.03 s for the first
-states, and one window.
+states, and then one time window (`cmc_time_window`).
 - <initial_time>0</initial_time> <final_time>0.02</final_time>
 + <initial_time>0</initial_time> <final_time>0.5</final_time>
 05 no-data-at-times, error, in dynamics: A tool runs completely before or after its data. The tool fails, crashes, or
@@ -159,7 +159,7 @@ def report_time_outside_data(setup: Setup, report: FindingCollector) -> None:
         # control has one.
         if last - first < _FIRST_STATES + window:
             report(
-                f"{describe_object(item)} runs for {last - first:.4g} s and needs "
+                f"{describe_object(item)} runs for {last - first:.4g} s, but needs "
                 f"{_FIRST_STATES + window:g} s for its first controls: OpenSim fails",
                 item,
                 # The window is blamed if it is larger than the default, else the time range.
@@ -169,7 +169,9 @@ def report_time_outside_data(setup: Setup, report: FindingCollector) -> None:
         filter_note = ""
         if getattr(item, "lowpass_cutoff_frequency_for_coordinates", 0.0) > 0.0:
             # Inverse dynamics and the analyses compute rows there as well.
-            filter_note = ": the filter extrapolates it, and OpenSim also computes rows there"
+            filter_note = (
+                ": the filter extrapolates the motion, and OpenSim also computes rows there"
+            )
         for name, kind in _list_tables(item):
             table = setup.read_table(name)
             span = (
@@ -214,14 +216,14 @@ def report_time_outside_data(setup: Setup, report: FindingCollector) -> None:
                 )
             if are_explicit[-1] and math.isfinite(last) and last > span[1] + slack:
                 report(
-                    f"'{name}' ends at {span[1]:g} s, before {last:g} s{kind or filter_note}",
+                    f"'{name}' ends at {span[1]:g} s, but the tool ends at {last:g} s{kind or filter_note}",
                     item,
                     tag=tags[-1],
                     fault="data-end-early",
                 )
             if are_explicit[0] and math.isfinite(first) and first < span[0] - slack:
                 report(
-                    f"'{name}' begins at {span[0]:g} s, after {first:g} s{kind or filter_note}",
+                    f"'{name}' begins at {span[0]:g} s, but the tool begins at {first:g} s{kind or filter_note}",
                     item,
                     tag=tags[0],
                     fault="data-begin-late",
@@ -417,8 +419,8 @@ def report_motion_in_degrees(setup: Setup, report: FindingCollector) -> None:
         # No joint turns by 10 rad (573 degrees), while a gait has knee angles of 60 degrees.
         elif largest > 10.0 and not header.in_degrees:
             report(
-                f"'{getattr(item, tag)}' does not say inDegrees=yes, and '{label}' is "
-                f"{largest:.4g} in it: OpenSim takes it for radians",
+                f"'{getattr(item, tag)}' does not say inDegrees=yes, but '{label}' reaches "
+                f"{largest:.4g}: OpenSim reads this in radians",
                 item,
                 tag=tag,
                 severity=ERROR,
@@ -440,8 +442,8 @@ def report_motion_in_degrees(setup: Setup, report: FindingCollector) -> None:
         if 0.0 < largest < math.pi:
             report(
                 f"'{user.coordinate_file}' does not say inDegrees=yes, and "
-                f"'{values.labels[column_index].text}' is at most {largest:.3g} in it: inverse "
-                "kinematics takes it for degrees, whatever the header says",
+                f"'{values.labels[column_index].text}' reaches only {largest:.3g}: inverse "
+                "kinematics reads it in degrees, whatever the header says",
                 user,
                 tag="coordinate_file",
             )

@@ -30,7 +30,7 @@ _SETTINGS: tuple[tuple[str, str, str, Callable[[Any], bool], str], ...] = (
     ("few-optimizer-iterations", "StaticOptimization", "optimizer_max_iterations", lambda value: value < 10,
      "the optimizer stops after {} iterations"),
     ("loose-optimizer-convergence", "StaticOptimization", "optimizer_convergence_criterion", lambda value: value > 0.05,
-     "the optimizer stops at {:g}, far from its goal"),
+     "the optimizer stops at a convergence criterion of {:g}, far from the optimum"),
 )  # fmt: skip
 """Name, class, property, test for invalid values, and message of each fault."""
 
@@ -120,8 +120,8 @@ met, and OpenSim runs forever.
 fails without them.
   <replace_force_set>true</replace_force_set>
 + <force_set_files>residuals.xml</force_set_files>
-11 replaced-forces, warning, in analyze: The forces of the model are replaced. Its muscles are missing, and the results
-belong to another model.
+11 replaced-forces, warning, in analyze: The forces of the model are replaced. The model then has no muscles, and the
+results belong to another model.
 - <replace_force_set>true</replace_force_set>
 + <replace_force_set>false</replace_force_set>
   <AnalysisSet name="analyses"> <objects> <Kinematics name="kinematics"/> </objects> </AnalysisSet>
@@ -160,12 +160,12 @@ their default lengths, whatever the coordinates are.
 OpenSim knows these two words only, and rejects others.
 - <apply_on_bodies>childs</apply_on_bodies>
 + <apply_on_bodies>child</apply_on_bodies>
-22 reaction-count, error, in reaction: Joints and the bodies that their reactions act on differ in number. OpenSim takes
-none, one for all, or one for each, and rejects other numbers.
+22 reaction-count, error, in reaction: The words in apply_on_bodies differ in number from the joints. OpenSim accepts
+no word, one word for all joints, or one word for each joint, and rejects other numbers.
 - <apply_on_bodies>child parent child</apply_on_bodies>
 + <apply_on_bodies>child parent</apply_on_bodies>
-23 force-of-one-name, warning, in forces: A force that a tool adds has the name of a force of the model. It replaces
-that.
+23 force-of-one-name, warning, in forces: A force that a tool adds has the name of a force of the model. The added force replaces
+the force of the model.
 - <CoordinateActuator name="knee_limit"> <coordinate>knee_angle</coordinate> </CoordinateActuator>
 + <CoordinateActuator name="reserve"> <coordinate>knee_angle</coordinate> </CoordinateActuator>
 24 force-off, info, in forces: A force of a set is disabled. It does not act.
@@ -201,7 +201,7 @@ def report_tool_setting(setup: Setup, report: FindingCollector) -> None:
         if not (tool.integrator_error_tolerance > 0.0 or is_a(tool, "AnalyzeTool")):
             report(
                 f"an error tolerance of {tool.integrator_error_tolerance:g} is never met: OpenSim "
-                "runs for ever",
+                "runs forever",
                 tool,
                 tag="integrator_error_tolerance",
                 # Other tools use the tolerance only if they integrate.
@@ -254,7 +254,9 @@ def report_tool_setting(setup: Setup, report: FindingCollector) -> None:
     names = Counter(item.name for item in setup.find_by_class("Analysis"))
     for analysis in setup.find_by_class("Analysis"):
         if not analysis.on:
-            report(f"{describe_object(analysis)} is off", analysis, tag="on", fault="analysis-off")
+            report(
+                f"{describe_object(analysis)} is disabled", analysis, tag="on", fault="analysis-off"
+            )
         if names[analysis.name] > 1:
             # Reported once for each name.
             names[analysis.name] = 0
@@ -320,7 +322,7 @@ def report_tool_setting(setup: Setup, report: FindingCollector) -> None:
             if len(analysis.apply_on_bodies) not in (0, 1, len(analysis.joint_names)):
                 # OpenSim takes none, one word for all joints, or one word for each.
                 report(
-                    f"{len(analysis.apply_on_bodies)} words for {len(analysis.joint_names)} "
+                    f"apply_on_bodies has {len(analysis.apply_on_bodies)} words for {len(analysis.joint_names)} "
                     "joints: OpenSim rejects it",
                     analysis,
                     tag="apply_on_bodies",
@@ -346,7 +348,7 @@ def report_tool_setting(setup: Setup, report: FindingCollector) -> None:
         for force in select_members(forces, "Force"):
             if not force.appliesForce:
                 report(
-                    f"{describe_object(force)} does not act",
+                    f"{describe_object(force)} is disabled (appliesForce is false)",
                     force,
                     tag="appliesForce",
                     fault="force-off",
@@ -354,7 +356,7 @@ def report_tool_setting(setup: Setup, report: FindingCollector) -> None:
     for controller in setup.find_by_class("Controller") if setup.tool is not None else ():
         if not controller.enabled:
             report(
-                f"{describe_object(controller)} is off",
+                f"{describe_object(controller)} is disabled: its actuators have no control",
                 controller,
                 tag="enabled",
                 fault="controller-off",

@@ -94,7 +94,7 @@ def report_degenerate_frame(subject: Subject, report: FindingCollector) -> None:
     for frame in station_defined_frames:
         if id(frame) in ids_in_cycles:
             report(
-                f"{describe_object(frame)} is defined through a point that is fixed to it: "
+                f"{describe_object(frame)} is defined by a point that is fixed to this frame: "
                 "OpenSim hangs",
                 frame,
             )

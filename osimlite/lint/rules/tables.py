@@ -244,7 +244,7 @@ def report_table_count(table: Table, report: FindingCollector) -> None:
         if severity is ERROR and row_kind == "rows" and number == number:
             lost_count = count - number
             severity, consequence = (
-                (ERROR, f": OpenSim ignores the last {lost_count:g}")
+                (ERROR, f": OpenSim ignores the last {format_count(round(lost_count), 'row')}")
                 if lost_count > 0
                 else (WARNING, "")
             )
@@ -362,8 +362,8 @@ def report_table_setting(table: Table, report: FindingCollector) -> None:
         # A word that means no is read as no.
         harmless = suggestion == "no"
         report(
-            f"'inDegrees' must be 'yes' or 'no', found '{degrees.value.text}': OpenSim reads no, "
-            "and takes the angles for radians",
+            f"'inDegrees' must be 'yes' or 'no', found '{degrees.value.text}': OpenSim reads this "
+            "as no, and the angles in radians",
             at=degrees.value.at,
             suggestion=suggestion,
             certain=True,

@@ -231,8 +231,8 @@ def report_document_version(subject: Subject, report: FindingCollector) -> None:
         )
     if late:
         report(
-            f"the document says version {subject.version} and holds {late}, which came later: "
-            "OpenSim reads it by the rules of the old format and does not find it",
+            f"the document says version {subject.version} but contains {late}, which came later: "
+            "OpenSim reads the document by the rules of the old format and does not find this element",
             number=0,
             attribute="Version",
             suggestion=str(CURRENT_VERSION),

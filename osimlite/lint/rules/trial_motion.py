@@ -274,7 +274,7 @@ def report_measured_weight(trial: Trial, report: FindingCollector) -> None:
         report,
         [WEIGHT, WRONG_WEIGHT],
         HICKS,
-        "give the mass of the subject to the ScaleTool, and look whether all plates are in the "
+        "give the mass of the subject to the ScaleTool, and check whether all plates are in the "
         "loads",
         "difference",
     )

@@ -181,7 +181,7 @@ def report_empty_value(subject: Subject, report: FindingCollector) -> None:
         ):
             report(
                 f"<{note_spec.tag}> of {describe_object(note.owner)} is empty: OpenSim then has no "
-                f"{note_spec.accepts.tag} there, not even the default, and fails where it needs one; "
+                f"{note_spec.accepts.tag} there, not even the default, and fails as soon as it needs one; "
                 "leave the element out",
                 note.owner,
                 consequence=FAILS,

@@ -106,7 +106,7 @@ def report_wrap_range(subject: Subject, report: FindingCollector) -> None:
             start = max(first, 1)
             end = last if last > 0 else count
             if end > count and start <= end and not (has_inverted_range or is_off):
-                consequence = "OpenSim fails when it computes its length"
+                consequence = "OpenSim fails when it computes the length of the path"
                 consequence += ", unless an earlier wrap has no points there" if may_leave else ""
                 report(
                     f"{range_text} ends beyond the {format_count(count, 'point')} of the path: {consequence}",
@@ -122,7 +122,7 @@ def report_wrap_range(subject: Subject, report: FindingCollector) -> None:
                     ", and OpenSim ignores the wraps after it" if start > end and not is_off else ""
                 )
                 report(
-                    f"{range_text} contains no segment of the path: it never wraps{ignored_note}",
+                    f"{range_text} contains no segment of the path: the path never wraps around this surface{ignored_note}",
                     wrap,
                     tag="range",
                 )
