@@ -90,11 +90,11 @@ def animate(
         SettingError: there is no such wrapping.
     """
     if not 1 <= fps <= 50:
-        raise OsimliteError(f"a GIF shows 1 to 50 frames per second, not {fps}")
+        raise OsimliteError(f"a GIF can show 1 to 50 frames per second, not {fps}")
     if not speed > 0.0:
-        raise OsimliteError(f"the speed of a film is a positive number, not {speed}")
+        raise OsimliteError(f"the speed of an animation must be a positive number, not {speed}")
     if len(trajectory.times) == 0:
-        raise OsimliteError("the motion has no moments; nothing can be drawn")
+        raise OsimliteError("the motion has no rows; nothing can be drawn")
     image = require("PIL.Image", extra="view", purpose="an animation")
     scene = build_scene(
         model,

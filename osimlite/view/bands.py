@@ -58,7 +58,9 @@ def read_bands(path: str | Path) -> dict[str, Band]:
     # One line of labels, and two points between which a band can be drawn.
     if not names or missing_labels or len(rows) < 3:
         problem = (
-            f"column '{missing_labels[0]}' is missing" if missing_labels else "there is no band"
+            f"column '{missing_labels[0]}' is missing"
+            if missing_labels
+            else "the file has no pair of a mean and a standard deviation"
         )
         raise DocumentError(
             f"{problem}; write per cent, NAME{MEAN} and NAME{DEVIATION} in the first line, and one row "
@@ -93,7 +95,7 @@ def check_bands(bands: Mapping[str, Band], titles: Sequence[str], *, cyclic: boo
     """
     if not bands.keys() & {*titles}:
         raise SettingError(
-            f"no panel is named {join_words([*bands], max_count=3)}, as the bands are; the panels are "
+            f"the bands are named {join_words([*bands], max_count=3)}, but no panel has such a name; the panels are "
             f"{join_words(list(dict.fromkeys(titles)), max_count=12)}"
         )
     if not cyclic:

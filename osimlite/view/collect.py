@@ -252,7 +252,7 @@ class _SceneCollector:
         while frame is not None and not isinstance(frame, PhysicalFrame):
             frame = self.tree.parent_of(frame)
         if frame is None:
-            raise UnsupportedError("is in no frame")
+            raise UnsupportedError("is not attached to a frame")
         body, frame_in_body = self.mechanism.frames[self.tree.path_of(frame) or ""]
         transform = frame_in_body @ make_offset(surface.translation, surface.xyz_body_rotation)
         surface_index, size = self._make_shape(surface)

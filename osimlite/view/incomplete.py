@@ -142,5 +142,5 @@ def describe_left_out(
 def _describe_group(parts: Sequence[tuple[str, str]]) -> str:
     """Return one sentence about parts that are not shown for the reason of the first."""
     path, reason = parts[0]
-    more = f" (and {format_count(len(parts) - 1, 'part')} like it)" if len(parts) > 1 else ""
+    more = f" (and {format_count(len(parts) - 1, 'similar part')})" if len(parts) > 1 else ""
     return f"not shown: {path}{more}: {reason}"

@@ -226,12 +226,14 @@ class ModelView:
         motion = self.motion
         if motion is None:
             if time is not None:
-                raise OsimliteError("a time needs a motion; name one after the model")
+                raise OsimliteError(
+                    "a time was given without a motion; name the file of a motion after the model"
+                )
             return self.q, [], frozenset(), {}
         first, last = float(motion.times[0]), float(motion.times[-1])
         if time is not None and not first <= time <= last:
             raise OsimliteError(
-                f"the motion goes from {first:g} to {last:g} s, and has no time {time:g}"
+                f"the motion goes from {first:g} to {last:g} s, and does not contain the time {time:g} s"
             )
         moment = np.array([first if time is None else time])
         values = get_values(motion, self.scene.mechanism)

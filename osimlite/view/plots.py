@@ -59,7 +59,7 @@ def plot_simulation(
         OsimliteError: the motion has no moments, or the folder cannot be written to.
     """
     if len(trajectory.times) == 0:
-        raise OsimliteError("the motion has no moments; nothing can be drawn")
+        raise OsimliteError("the motion has no rows; nothing can be drawn")
     plotted_mechanism = (
         mechanism if mechanism is not None else getattr(trajectory, "mechanism", None)
     )

@@ -223,7 +223,7 @@ def test_options_out_of_range_are_refused(options, said, tmp_path):
 def test_nothing_is_left_behind_by_a_failure(tmp_path, monkeypatch):
     motion = stroll()
     empty = Recorded(motion.times[:0], motion.coordinates, motion.values[:0], motion.speeds[:0])
-    with pytest.raises(OsimliteError, match="no moments"):
+    with pytest.raises(OsimliteError, match="no rows"):
         animate(dynamic_walker(), empty, tmp_path / "a.gif")
     monkeypatch.setitem(sys.modules, "PIL.Image", None)
     with pytest.raises(MissingDependency, match=r"needs Pillow.*osimlite\[view\]"):

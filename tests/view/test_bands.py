@@ -44,7 +44,7 @@ def test_a_band_lies_behind_the_curves_of_its_panel(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", "there is no band"),
+        ("", "has no pair of a mean"),
         ("per cent, knee_mean\n0, 1\n1, 1\n", "'knee_sd' is missing"),
         (TEXT.replace("20", "many"), "expected numbers"),
         (TEXT.replace("50", "0"), "increase"),
@@ -62,7 +62,7 @@ def test_a_band_that_nothing_shows_is_an_error(tmp_path: Path) -> None:
     table = StoTable("angles", TIMES, ("knee",), np.sin(TIMES)[:, None])
     numbers = np.zeros(3)
     band = Band(np.array([0.0, 50.0, 100.0]), numbers, numbers)
-    with pytest.raises(SettingError, match="no panel is named hip"):
+    with pytest.raises(SettingError, match="the bands are named hip"):
         plot_tables({"a.sto": table}, tmp_path, NO_NAMES, bands={"hip": band})
     with pytest.raises(SettingError, match="complete gait cycle"):
         plot_tables({"a.sto": table}, tmp_path, NO_NAMES, bands={"knee": band})

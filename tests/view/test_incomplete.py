@@ -117,13 +117,13 @@ def test_many_parts_are_counted() -> None:
     ]
     lines = [*describe_left_out([*parts, *meshes])]
     assert len(lines) == MAX_REMARKS + 2 and lines[-2] == "not shown: 3 more parts"
-    assert lines[-1] == "not shown: /b/1 (and 1 part like it): the mesh file x.vtp is missing"
+    assert lines[-1] == "not shown: /b/1 (and 1 similar part): the mesh file x.vtp is missing"
 
 
 def test_parts_with_the_same_reason_are_one_sentence() -> None:
     reason = "is a FunctionBasedPath, which has no points"
     parts = [(f"/a/{number}", reason) for number in range(MAX_SAME + 1)]
     assert [*describe_left_out([parts[0], ("/b", "is wrong"), *parts[1:]])] == [
-        f"not shown: /a/0 (and {MAX_SAME} parts like it): {reason}",
+        f"not shown: /a/0 (and {MAX_SAME} similar parts): {reason}",
         "not shown: /b: is wrong",
     ]

@@ -223,7 +223,7 @@ def test_a_motion_without_forces_has_no_pictures_of_forces(tmp_path):
 def test_failures_are_said_in_a_sentence(tmp_path, monkeypatch):
     motion = stroll()
     empty = Recorded(motion.times[:0], motion.coordinates, motion.values[:0], motion.speeds[:0])
-    with pytest.raises(OsimliteError, match="no moments"):
+    with pytest.raises(OsimliteError, match="no rows"):
         plot_simulation(empty, tmp_path)
     (tmp_path / "taken").write_text("")
     with pytest.raises(OsimliteError, match="cannot make a folder here"):

@@ -230,7 +230,9 @@ def find_basin_offsets(
     """
     offsets = _find_index(engine, x) if x else None, _find_index(engine, y) if y else None
     if offsets[0] is not None and offsets[0] == offsets[1]:
-        raise OsimliteError(f"'{x}' and '{y}' are the same number; a basin is drawn over two")
+        raise OsimliteError(
+            f"'{x}' and '{y}' are the same variable; a basin needs two different ones"
+        )
     return offsets
 
 

@@ -129,12 +129,13 @@ def find_cycle(
     while size > tolerance:
         if step_count == max_steps:
             raise OsimliteError(
-                f"no cycle of '{name}' is found after {step_count} steps of Newton; still {size:.2g} off"
+                f"no gait cycle of '{name}' was found in {step_count} Newton steps: the state after a step "
+                f"still differs by {size:.2g}"
             )
         slope = differentiate_step_map(step_map, step_map.expand(reduced))
         if not np.isfinite(slope).all():
             raise OsimliteError(
-                f"'{name}' makes no step from near the start; give a start that walks"
+                f"'{name}' makes no step from a state near the initial state; give an initial state from which it walks"
             )
         # Newton's method for P(x) - x = 0, whose Jacobian is dP/dx - I.
         move = np.linalg.solve(slope - np.eye(len(reduced)), -residual)
@@ -147,7 +148,8 @@ def find_cycle(
             step_fraction /= 2.0
         if not trial_size < previous_size:
             raise OsimliteError(
-                f"no cycle of '{name}' is found from there; the best is {previous_size:.2g} off"
+                f"no gait cycle of '{name}' was found from this initial state: the state after a step differs "
+                f"by at least {previous_size:.2g}"
             )
         reduced = reduced + step_fraction * move
         residual = next_state

@@ -191,7 +191,7 @@ class CycleSearch:
         # Without varied initial values all random walkers of a model would be the same.
         if not self._starts:
             raise SettingError(
-                "walkers are drawn at random; vary some values and speeds of coordinates at the start"
+                "the search draws random initial states; vary the initial values or speeds of some coordinates with --vary"
             )
         self._least = [variable.low for variable in plan.variables]
         engine: Any = self.variants.base_variant.engine
@@ -268,7 +268,9 @@ class CycleSearch:
         variant = self.variants.make_variant(self.make_sample(fractions))
         # Step maps of models with other coordinates or contacts cannot be compared.
         if variant.structure != self.variants.base_variant.structure:
-            raise OsimliteError("the numbers change the structure of the model; vary others")
+            raise OsimliteError(
+                "the varied parameters change the structure of the model; vary other parameters"
+            )
         return variant.engine
 
     # ---------------------------------------------------------------------------------------- random starts

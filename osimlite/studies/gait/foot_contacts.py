@@ -74,7 +74,7 @@ def find_footing(engine: BatchEngine, feet: Sequence[str] | None = None) -> Foot
     """
     if not engine.contacts:
         raise OsimliteError(
-            f"'{engine.mechanism.name}' has no contact forces, so that nothing walks"
+            f"'{engine.mechanism.name}' has no contact forces, so it cannot walk; add contact forces between feet and ground"
         )
     soles = _find_soles(engine)
     sole_contacts = [sole.contact for sole in soles]
@@ -91,11 +91,11 @@ def find_footing(engine: BatchEngine, feet: Sequence[str] | None = None) -> Foot
                 )
             if requested.count(contact) > 1:
                 raise OsimliteError(
-                    f"'{contact}' is given to the feet twice; name it once, for one of them"
+                    f"'{contact}' is named for both feet, or twice; name it once, for one foot"
                 )
         if len(named_feet) < 2:
             raise OsimliteError(
-                f"a walk needs two feet, not only '{feet[0]}'; name the contacts of each"
+                f"a walk needs two feet, found '{feet[0]}' only; name the contact forces of both feet, each with a --foot"
             )
     else:
         named_feet = _find_feet(engine.mechanism, soles)
@@ -116,14 +116,16 @@ def _find_feet(mechanism: Mechanism, soles: Sequence[_SoleContact]) -> tuple[tup
     )
     if not end_bodies:
         raise OsimliteError(
-            f"no sphere of '{mechanism.name}' touches a half space; feet are spheres on the ground"
+            f"no sphere of '{mechanism.name}' touches a half space; a foot needs a contact force between a "
+            "sphere and a half space"
         )
     # A walk alternates between two feet.
     if len(end_bodies) != 2:
         names = join_words(mechanism.bodies[end].name for end in end_bodies)
         raise OsimliteError(
-            f"'{mechanism.name}' touches the ground with the ends of {format_count(len(end_bodies), 'leg')} ({names}), not of "
-            "two; say which contacts are feet with --foot"
+            f"'{mechanism.name}' touches the ground with the ends of {format_count(len(end_bodies), 'leg')} "
+            f"({names}), but a walk "
+            "needs two feet; name their contact forces with --foot"
         )
     result = []
     for end in end_bodies:

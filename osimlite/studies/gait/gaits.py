@@ -147,7 +147,7 @@ def find_gait(
         )
         if not candidates:
             raise SimulationError(
-                f"none of {samples} random walkers made two steps; widen the ranges, or draw more (--samples)"
+                f"none of {samples} random walkers made two steps; widen the ranges, or try more walkers (--samples)"
             )
         cycles = close_candidates(
             search,
@@ -179,19 +179,21 @@ def _check_numbers(settings: Mapping[str, Any]) -> None:
     for name, minimum in (("samples", 1), ("tries", 1), ("enough", 1), ("budget", 0)):
         if settings[name] < minimum:
             raise SettingError(
-                f"'{name}' is a whole number from {minimum} on, not {settings[name]}"
+                f"'{name}' must be a whole number of at least {minimum}, not {settings[name]}"
             )
     for name in ("stable", "perturb"):
         if not (isfinite(settings[name]) and settings[name] > 0.0):
-            raise SettingError(f"'{name}' is a positive number, not {settings[name]:g}")
+            raise SettingError(f"'{name}' must be a positive number, not {settings[name]:g}")
     for name in ("digits", "start_digits"):
         if settings[name] is not None and not 1 <= settings[name] <= 17:
-            raise SettingError(f"'{name}' is a whole number from 1 to 17, not {settings[name]}")
+            raise SettingError(
+                f"'{name}' must be a whole number from 1 to 17, not {settings[name]}"
+            )
     # Every turn of the search for stability has a seed of its own, of 32 bits at most.
     max_seed = 2**32 - 1 - settings["budget"]
     if not 0 <= settings["seed"] <= max_seed:
         raise SettingError(
-            f"the seed is a whole number from 0 to {max_seed}, not {settings['seed']}"
+            f"the seed must be a whole number from 0 to {max_seed}, not {settings['seed']}"
         )
 
 
@@ -238,8 +240,8 @@ def close_candidates(
             break
     if not cycles:
         raise SimulationError(
-            f"none of the {len(candidates)} best random walkers that made two steps comes to a cycle; draw more "
-            "(--samples), lead more of them on (--tries), or vary other numbers"
+            f"none of the {len(candidates)} best random walkers that made two steps leads to a gait cycle; try more "
+            "walkers (--samples), refine more of the best ones (--tries), or vary other quantities"
         )
     return cycles
 
@@ -263,7 +265,8 @@ def round_cycle(search: CycleSearch, model_cycle: ModelCycle, digits: int) -> Mo
         )
     except OsimliteError as error:
         raise SimulationError(
-            f"with numbers of {digits} digits the cycle is lost; keep more. {error.message}"
+            f"with parameters that are rounded to {digits} digits, there is no gait cycle; keep more digits "
+            f"(--digits). {error.message}"
         ) from None
 
 

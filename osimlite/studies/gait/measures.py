@@ -107,7 +107,7 @@ def planted(engine: Any, feet: Sequence[str] | None) -> registry.StartFunction:
         SettingError: the engine is not the compiled one.
     """
     if engine.name != "compiled":
-        raise SettingError("a walker is planted with --engine compiled only")
+        raise SettingError("--planted needs --engine compiled")
     footing = find_footing(engine, feet)
 
     def plant(

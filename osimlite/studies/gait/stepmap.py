@@ -51,8 +51,8 @@ def refuse_constraints(mechanism: Mechanism) -> None:
     """
     if constraint_names := list_constraints(mechanism):
         raise UnsupportedError(
-            f"gaits are looked for in all directions of the state, some of which {join_words(constraint_names)} takes away; set "
-            "isEnforced of a constraint and prescribed of a coordinate to false"
+            f"a gait cycle cannot be computed with constraints or prescribed coordinates: {join_words(constraint_names)}; set "
+            "isEnforced of each constraint and prescribed of each coordinate to false"
         )
 
 
@@ -174,9 +174,9 @@ class StepMap:
         )
         (walk,) = extract_walks(self.engine, state[None], runs, self.footing)
         if not walk.steps:
-            reason = f"it fell on {walk.fell_on}" if walk.fell_on else "none"
+            reason = f" (it fell on {walk.fell_on})" if walk.fell_on else ""
             raise OsimliteError(
-                f"'{self.engine.mechanism.name}' makes no step within {walk.end:.3g} s ({reason}); give another start"
+                f"'{self.engine.mechanism.name}' makes no step within {walk.end:.3g} s{reason}; give another initial state"
             )
         # The ends are left out: a foot that just touches has a contact force without a derivative.
         times = np.linspace(0.0, walk.steps[0].time, NEUTRAL_SAMPLES + 2)[1:-1].tolist()
@@ -190,7 +190,7 @@ class StepMap:
         images = self._make_step(state[None], 1)
         if np.isnan(images.states).any():
             raise OsimliteError(
-                f"'{self.engine.mechanism.name}' makes one step only; give another start"
+                f"'{self.engine.mechanism.name}' makes one step only; give another initial state"
             )
         return images.states[0]
 

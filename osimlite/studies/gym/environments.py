@@ -57,7 +57,7 @@ class _ObservedCopies:
             if name not in self.state_names:
                 suggestion = suggest_name(name, self.state_names)
                 raise gymnasium.error.Error(
-                    f"nothing is called '{name}' that could be hidden{suggestion}"
+                    f"the environment has no state '{name}' to hide{suggestion}"
                 )
         self._visible = [k for k, name in enumerate(self.state_names) if name not in task.hidden]
         self.labels = tuple(self.state_names[k] for k in self._visible)
@@ -154,19 +154,19 @@ def _resolve_task(
     if task is not None:
         if model is not None:
             raise gymnasium.error.Error(
-                "this environment has its model; take osimlite/Model-v0 for another"
+                "this environment has a fixed model; use osimlite/Model-v0 for another model"
             )
         base_task = task if isinstance(task, Task) else task()
         return replace(base_task, **options, **({} if reward is None else {"reward": reward}))
     if model is None or reward is None:
-        raise gymnasium.error.Error("give a task, or a model and a reward(before, after)")
+        raise gymnasium.error.Error("pass a task, or a model and a function reward(before, after)")
     return make_task(model, reward, **options)
 
 
 def _check_render_mode(mode: str | None) -> str | None:
     """Return the mode of rendering (None for none); raise an error of Gymnasium for an unknown one."""
     if mode not in (None, "rgb_array"):
-        raise gymnasium.error.UnsupportedMode(f"pictures come as 'rgb_array', not as '{mode}'")
+        raise gymnasium.error.UnsupportedMode(f"render_mode must be 'rgb_array', not '{mode}'")
     return mode
 
 

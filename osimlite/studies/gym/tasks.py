@@ -194,7 +194,7 @@ def make_task(
     if not any(isinstance(component, Actuator) for component in template.components()):
         from osimlite.errors import ModelError
 
-        raise ModelError(f"'{template.name}' has no actuators that could be learnt to use")
+        raise ModelError(f"'{template.name}' has no actuators for an agent to control; add some")
     options.setdefault(
         "is_over", lambda observation: np.zeros(len(observation.controls), dtype=bool)
     )

@@ -136,7 +136,7 @@ class Reflexes:
     def _read_noise(self, node: SettingNode) -> None:
         """Read the noise of controls, as in SCONE, and of sensors, which is an addition of ours."""
         if self._is_noisy:
-            raise node.error(f"there is a {NOISE} already")
+            raise node.error(f"this controller has a second {NOISE}; keep one")
         self._is_noisy = True
         noise = self._limits[:, LIMITS.SEED :]
         noise[:, 0] = seed = node.number("random_seed", 123.0)
@@ -150,13 +150,13 @@ class Reflexes:
         ):
             noise[:, 1 + index] = width = node.number(key, 0.0)
             if width < 0.0:
-                raise node.error(f"'{key}' must not be negative, and is {width:g}")
+                raise node.error(f"'{key}' must not be negative, but is {width:g}")
         node.refuse_unread_parts(f"a {NOISE}")
         # Python data and YAML are written for osimlite, so that only users of SCONE may expect its
         # noise.
         if node.file.endswith(".scone"):
             warn_caller(
-                "noise is as large as SCONE's, but not the same: its numbers depend on the compiler of SCONE"
+                "the noise is as large as in SCONE, but its random numbers differ: those of SCONE depend on its compiler"
             )
 
     def _read_functions(self, node: SettingNode, parameters: Parameters) -> None:
@@ -171,7 +171,7 @@ class Reflexes:
         node.refuse_unread_parts(f"a {FEED_FORWARD}")
         if len(functions) != 1:
             raise node.error(
-                f"a {FEED_FORWARD} needs one function: {join_words(list(TIME_FUNCTIONS))}"
+                f"a {FEED_FORWARD} needs one function; supported: {join_words(list(TIME_FUNCTIONS))}"
             )
         function_type, function = functions[0]
         names = {
@@ -180,7 +180,9 @@ class Reflexes:
             if matches_pattern(n, include) and not matches_pattern(n, exclude)
         }
         if not names:
-            raise node.error(f"no actuator is in '{include}' and not in '{exclude}'")
+            raise node.error(
+                f"no actuator matches include = '{include}' without matching exclude = '{exclude}'"
+            )
         for target, name in names.items():
             # Without its side the name of a parameter is the same for both legs.
             prefix = name[:-2] if symmetric and name.endswith(SIDES) else name
@@ -200,7 +202,7 @@ class Reflexes:
         self.symmetric = node.flag("symmetric", True)
         for key in ("use_model_com_reference_pos", "omnidirectional"):
             if node.flag(key, False):
-                raise node.error(f"{key} is not done here")
+                raise node.error(f"osimlite does not support '{key}'; leave it out")
         self._swings_from_stance = node.flag("allow_stance_swing_transition", False)
         self._limits[:, LIMITS.DELAY] = (
             node.number("leg_load_sensor_delay", 0.0) / self.walkers.step
@@ -325,7 +327,7 @@ class Reflexes:
         # Refused explicitly, as ignoring them would change the walk silently.
         for key in ("min_control_value", "max_control_value", *reflex_type.refused):
             if node.get(key) is not None:
-                raise node.error(f"'{key}' of reflexes is not done here")
+                raise node.error(f"osimlite does not support '{key}' of reflexes; leave it out")
         target = node.text("target")
         source = node.text("source", target if reflex_type.defaults_to_target else None)
 
@@ -368,11 +370,11 @@ class Reflexes:
         """Return the delay (s) of a reflex for each candidate."""
         delay = parameters.get_number(node, "delay", 0.0, prefix + "delay")
         if np.any(delay < 0.0):
-            raise node.error(f"a delay of {delay.min():g} s knows what is to come")
+            raise node.error(f"a delay of {delay.min():g} s is negative; set a delay of at least 0")
         # Written so that NaN is refused, too.
         if not np.all(delay <= MAX_DELAY_S):
             raise node.error(
-                f"a delay of {delay.max():g} s is more than {MAX_DELAY_S:g} s, the longest that is remembered"
+                f"a delay of {delay.max():g} s is too long; the maximum is {MAX_DELAY_S:g} s"
             )
         return delay
 

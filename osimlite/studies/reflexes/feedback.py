@@ -63,7 +63,7 @@ class Feedback:
         values: Mapping[str, float] | str | Path = MappingProxyType({}),
     ) -> None:
         if isinstance(given, Mapping):
-            self._source_text = "data of Python"
+            self._source_text = "Python data"
             root_node = make_node(given)
             folder = Path()
         else:
@@ -80,7 +80,7 @@ class Feedback:
         selection = controller_parent.select_one(*CONTROLLERS)
         if selection is None:
             raise controller_parent.error(
-                f"a controller is needed: {join_words(list(CONTROLLERS))}"
+                f"a controller is required; supported: {join_words(list(CONTROLLERS))}"
             )
         self._class_name, self._node = selection
         self.step = read_control_step(model)

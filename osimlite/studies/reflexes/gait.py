@@ -88,7 +88,7 @@ class GaitMeasures(NamedTuple):
                 f"{strides.number}, of {strides.time:.3f} s and {strides.length:.3f} m; {strides.touches} steps without scuffs"
             )
             texts["stance"] = (
-                f"{left:.1f} % of a stride left, {right:.1f} % right; both feet {100.0 * strides.both:.1f} %"
+                f"left foot {left:.1f} % of a stride, right foot {right:.1f} %; both feet {100.0 * strides.both:.1f} %"
             )
             first_peak, valley, second_peak = strides.humps
             texts["ground"] = (

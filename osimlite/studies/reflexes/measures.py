@@ -236,10 +236,10 @@ class GaitMeasure(Measure):
         self.always = node.flag("always_apply_early_termination_penalty", False)
         for key in ("use_height_wrt_feet", "use_initial_heading"):
             if node.flag(key, False):
-                raise node.error(f"{key} is not done here")
+                raise node.error(f"osimlite does not support '{key}'; leave it out")
         for key in ("continue_after_fall", "base_bodies", "direction"):
             if node.get(key) is not None:
-                raise node.error(f"{key} is not done here")
+                raise node.error(f"osimlite does not support '{key}'; leave it out")
         self.walkers.expect_legs()
         numbers = (("termination_height", 0.5), ("load_threshold", 0.1), ("min_step_duration", 0.1))
         self._first = self.criteria.add(
@@ -300,7 +300,9 @@ class JumpMeasure(Measure):
         """Read when a jump starts and ends."""
         for key in ("jump_type", "jump_angle", "body", "target_body", "offset", "recover_time"):
             if node.get(key) is not None:
-                raise node.error(f"'{key}' of a JumpMeasure is not done here")
+                raise node.error(
+                    f"osimlite does not support '{key}' of a JumpMeasure; leave it out"
+                )
         self.walkers.expect_legs()
         self.negates = node.flag("negate_result", False)
         at_peak = node.flag("terminate_on_peak", True)
@@ -348,7 +350,7 @@ class EffortMeasure(Measure):
         walkers = self.walkers
         if effort_type not in EFFORTS:
             raise node.error(
-                f"effort of the type '{effort_type}' is not done here{suggest_or_list(effort_type, EFFORTS)}"
+                f"osimlite does not support the effort type '{effort_type}'{suggest_or_list(effort_type, EFFORTS)}"
             )
         self.by_distance = node.flag("use_cost_of_transport", False)
         self.least_distance = node.number("min_distance", 1.0)
@@ -417,7 +419,9 @@ class Penalty(Measure):
         """
         numbers = [factor, node.number("min", -inf), node.number("max", inf)]
         if numbers[1] > numbers[2]:
-            raise node.error(f"from {numbers[1]:g} to {numbers[2]:g} there is no value")
+            raise node.error(
+                f"the range has a minimum of {numbers[1]:g} above its maximum of {numbers[2]:g}"
+            )
         numbers.append(node.number("abs_penalty", node.number("abs_range_penalty", 0.0)))
         numbers.append(node.number("squared_penalty", node.number("squared_range_penalty", 0.0)))
         mode = node.text("mode", "average")
@@ -507,7 +511,7 @@ class CompositeMeasure(Measure):
     def read(self, node: SettingNode) -> None:
         """Read the parts; with `dual_sided` or `symmetric` there is one of each part for either side."""
         if node.flag("use_first_non_zero_result", False):
-            raise node.error("use_first_non_zero_result is not done here")
+            raise node.error("osimlite does not support 'use_first_non_zero_result'; leave it out")
         # `symmetric` applies where `dual_sided` is not set.
         is_dual_sided = node.flag("dual_sided", node.flag("symmetric", False))
         blocks = [node, *(block for _, block in node.select_all("Measures"))]

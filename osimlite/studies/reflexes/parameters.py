@@ -139,7 +139,7 @@ class Parameters:
         """Return the values (count,) of a parameter, and note its definition."""
         if not lower <= mean <= upper:
             raise number_node.error(
-                f"the parameter '{name}' begins at {mean:g}, which is not from {lower:g} to {upper:g}"
+                f"the parameter '{name}' has the initial value {mean:g}, outside its range of {lower:g} to {upper:g}"
             )
         # NaN stands for a parameter that states no standard deviation.
         std = self.auto_std_factor * abs(mean) if np.isnan(std) else std
@@ -187,7 +187,9 @@ def read_par(path: str | Path) -> dict[str, tuple[float, float, float]]:
             best_value, mean, std = (parse_finite(field) for field in fields[1:4])
         except ValueError:
             raise DocumentError(
-                "expected a name, best, mean and standard deviation", file=str(path), line=number
+                "expected four words: name, best value, mean and standard deviation",
+                file=str(path),
+                line=number,
             ) from None
         result[fields[0]] = best_value, mean, std
     return result

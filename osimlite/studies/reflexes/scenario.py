@@ -135,16 +135,14 @@ class Scenario:
         self._objective = objective
         self.duration = objective.number("max_duration", 1e3)
         if not self.duration > 0.0:
-            raise objective.error(
-                f"a walk of {self.duration:g} s is none; max_duration is to be positive"
-            )
+            raise objective.error(f"max_duration is {self.duration:g} s; set a positive duration")
         settings = objective.get("ModelOpenSim4")
         if settings is None:
             other_model = next(
                 (name for name, _ in objective.parts if name.startswith("Model")), "no model"
             )
             raise objective.error(
-                f"of models only ModelOpenSim4 is done here, and this has {other_model}"
+                f"osimlite supports only ModelOpenSim4 as a model, found {other_model}"
             )
         self.settings: SettingNode = settings
         if model is None:
@@ -198,10 +196,10 @@ class Scenario:
                 (name for name, _ in objective.parts if name.endswith("Controller")), "none"
             )
             raise objective.error(
-                f"of controllers {join_words(list(CONTROLLERS))} are done here, and this has {other_controller}"
+                f"osimlite does not support {other_controller}; supported controllers: {join_words(list(CONTROLLERS))}"
             )
         if measure is None:
-            raise objective.error(f"a measure is needed: {join_words(list(MEASURES))}")
+            raise objective.error(f"a measure is required; supported: {join_words(list(MEASURES))}")
         self.controller, self.measure = controller, measure
         objective.refuse_unread_parts("a SimulationObjective", tuple(MEASURES))
         method = settings.text("integration_method", "SemiExplicitEuler2")
@@ -531,4 +529,6 @@ def _settle_on_ground(walkers: Walkers, candidate: int, height: int, load: float
         if abs(carried_load - load) / load <= LOAD_TOLERANCE:
             return
         upper, lower = (upper, middle_height) if carried_load > load else (middle_height, lower)
-    raise SimulationError(f"in no height the ground carries {load:g} of the weight")
+    raise SimulationError(
+        f"no initial height was found at which the ground carries {load:g} times the body weight"
+    )

@@ -83,12 +83,14 @@ def search_parameters(
     seed = scenario.seed if seed is None else seed
     if population < MIN_POPULATION or generations < 1:
         raise SettingError(
-            f"a search takes {MIN_POPULATION} candidates in a generation at least, and one generation"
+            f"a search needs at least {MIN_POPULATION} candidates in each generation, and at least one generation"
         )
     strategy = require("cma", extra="optimize", purpose="the search for parameters")
     parameters = scenario.parameters()
     if not parameters:
-        raise SettingError("the scenario has no parameters, which are written as 1~0.1<0,2>")
+        raise SettingError(
+            "the scenario has no parameters to optimize; write a parameter as 1~0.1<0,2> (mean, standard deviation, bounds)"
+        )
     path = Path(folder) / BEST_FILE
     if not resume and path.exists():
         raise SettingError(
@@ -103,7 +105,7 @@ def search_parameters(
         for name in sorted({*saved_parameters} ^ {*names}):
             place_text = "the scenario" if name in saved_parameters else f"'{path}'"
             raise SettingError(
-                f"{place_text} has no parameter '{name}': they are of different searches"
+                f"{place_text} has no parameter '{name}', so it belongs to another search; resume with its own scenario"
             )
         # The scenario may have other bounds than when the file was written.
         parameters = [

@@ -78,7 +78,7 @@ class SettingNode:
         matches = [node for name, node in self.parts if name == key]
         if len(matches) > 1:
             # Which of the two the author meant cannot be known.
-            raise matches[1].error(f"'{key}' stands here again; it counts once only")
+            raise matches[1].error(f"'{key}' is set twice; remove one of the two")
         return matches[0] if matches else None
 
     def text(self, key: str, default: str | None = None) -> str:
@@ -195,7 +195,7 @@ class SettingNode:
         matches = [*self.select_all(*names)]
         if len(matches) > 1:
             raise matches[1][1].error(
-                f"'{matches[1][0]}' stands beside '{matches[0][0]}'; join them in a composite one"
+                f"'{matches[1][0]}' follows '{matches[0][0]}', but only one is allowed here; put both into a composite one"
             )
         return matches[0] if matches else None
 
@@ -216,7 +216,9 @@ class SettingNode:
         for name, node in self.parts:
             if name not in self.read_keys and name not in IGNORED_KEYS:
                 suggestion = suggest_name(name, {*self.read_keys, *more_keys})
-                raise node.error(f"'{name}' of {node_description} is not done here{suggestion}")
+                raise node.error(
+                    f"osimlite does not support '{name}' of {node_description}{suggestion}"
+                )
 
 
 def parse_finite(text: str) -> float:
@@ -239,7 +241,7 @@ class _Budget:
         self.files -= 1
         if self.files < 0:
             raise DocumentError(
-                f"the files include more than {MAX_INCLUDED_FILES} others, some of them again and again",
+                f"the scenario includes more than {MAX_INCLUDED_FILES} files, some of them repeatedly",
                 file=str(path),
             )
 
@@ -248,7 +250,7 @@ class _Budget:
         self.parts -= 1
         if self.parts < 0:
             raise node.error(
-                f"the scenario has more than {MAX_PARTS} parts with all that it includes"
+                f"the scenario and its included files have more than {MAX_PARTS} parts"
             )
 
 
@@ -303,7 +305,10 @@ def _read_source(
         )
         raise DocumentError(message, file=str(path)) from None
     if depth > MAX_INCLUDE_DEPTH:
-        raise DocumentError("the files include one another without end", file=str(path))
+        raise DocumentError(
+            "this file is part of an endless chain of includes: the files include each other",
+            file=str(path),
+        )
     if path.suffix in SUFFIXES:
         root_node = SettingNode(file=str(path), line=1)
         match = parse_yaml(text, str(path), with_lines=True)
@@ -411,7 +416,9 @@ class _TokenReader:
         """Return the next token, and move on."""
         if self.index >= len(self.tokens):
             raise DocumentError(
-                "the file ends in the middle of something", file=str(self.path), line=self.line()
+                "the file ends too early: a value or a '}' is missing",
+                file=str(self.path),
+                line=self.line(),
             )
         self.index += 1
         return self.tokens[self.index - 1][0]
@@ -443,7 +450,7 @@ class _TokenReader:
             if token == "{":
                 self.fill(child_node, level + 1)
                 if self.next() != "}":
-                    raise child_node.error(f"'{key}' has no end")
+                    raise child_node.error(f"'{key}' has no closing '}}'")
             elif token != "=":
                 raise child_node.error(f"expected '=' or '{{' after '{key}', found '{token}'")
             # Constants are shared by all files that are read after this line.

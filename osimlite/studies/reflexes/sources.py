@@ -186,7 +186,7 @@ def _select_point_factory(quantity: str, source_type: int) -> SourceFactory:
         offset = node.vector("offset", "0 0 0")
         direction = node.vector("direction")
         if not direction.any():
-            raise node.error("'direction' is 0 0 0, along which nothing is sensed")
+            raise node.error("'direction' is 0 0 0; set a direction other than zero")
         # The offset is in the frame of the body, the kernels know its link only.
         link, frame = sensed_model.engine.placements[number]
         numbers = *(frame[:3, :3] @ offset + frame[:3, 3]), *direction
@@ -208,10 +208,12 @@ def _read_axis(sensed_model: SensedModel, node: SettingNode, number: int, side: 
     the sagittal plane reverses rotations about x and y and keeps those about z.
     """
     if node.flag("use_rotation_vector", False):
-        raise node.error("'use_rotation_vector' of reflexes is not done here")
+        raise node.error(
+            "osimlite does not support 'use_rotation_vector' of reflexes; leave it out"
+        )
     axis = node.vector("axis", "0 0 1")
     if not axis.any():
-        raise node.error("'axis' has no direction")
+        raise node.error("'axis' is 0 0 0; set an axis other than zero")
     # A body with a side counts as of this side, else the side of the reflex decides.
     body_side = next(
         (end for end in SIDES if _list_bodies(sensed_model)[number].endswith(end)), side
@@ -234,7 +236,7 @@ def _make_angle_source(
     # A rotation about a general axis has no angle that is a function of the orientation alone.
     if np.count_nonzero(axis) != 1:
         raise node.error(
-            "angles are about [ 1 0 0 ], [ 0 1 0 ] or [ 0 0 1 ]; about another 'axis' there is only KV"
+            "a reflex to an angle needs the 'axis' [ 1 0 0 ], [ 0 1 0 ] or [ 0 0 1 ]; for another axis, only KV is supported"
         )
     name = f"{_list_bodies(sensed_model)[number]}.angle{_format_vectors(axis)}"
     return Source(name, SOURCE_TYPE.ANGLE, link, 0, (*np.ravel(frame[:3, :3].T), *axis))

@@ -245,7 +245,9 @@ class SensedModel:
                 present_body = parents[present_body]
             base = parents.get(upper_body, "")
             if base not in names:
-                raise ModelError(f"'{upper_body}' hangs on no body")
+                raise ModelError(
+                    f"the body '{upper_body}' has no parent body, so it cannot belong to a leg"
+                )
             legs.append(
                 Leg(side, names.index(base), names.index(foot), pairs[f"{contact}{side}"], length)
             )
@@ -262,7 +264,7 @@ class SensedModel:
             upper, contact = self._leg_names
             suggestion = suggest_name(f"{upper}_l", [body.name for body in self.mechanism.bodies])
             expected_names = f"bodies '{upper}_l' and '{upper}_r', feet, and contact forces '{contact}_l' and '{contact}_r'"
-            raise ModelError(f"the model has no legs, which are {expected_names}{suggestion}")
+            raise ModelError(f"the model has no legs; it needs {expected_names}{suggestion}")
 
 
 def _read_control_bounds(actuator: Any) -> tuple[float, float]:
@@ -319,7 +321,8 @@ class Walkers(SensedModel):
         other_actuators = self.names[len(self.muscles) :]
         if other_actuators:
             raise ModelError(
-                f"{join_words(other_actuators)} are no muscles, and efforts of muscles alone are known"
+                f"{join_words(other_actuators)}: these actuators are not muscles, but this measure supports "
+                "the effort of muscles only"
             )
         state = self.copies.simulation.state
         size = len(self.coordinates)

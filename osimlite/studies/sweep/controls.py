@@ -128,7 +128,7 @@ def expand_nodes(name: str) -> list[str]:
         last_time, _, number = end_and_count.partition(":")
         if not number.isdigit() or int(number) < 2:
             raise SettingError(
-                f"nodes are given as @FIRST:LAST:COUNT, with a count of two or more; got '{name}'"
+                f"write nodes of a control as @FIRST:LAST:COUNT, with a COUNT of at least 2; found '{name}'"
             )
         times = np.linspace(
             _parse_time(name, first_time), _parse_time(name, last_time), int(number)
@@ -148,7 +148,7 @@ def _parse_time(name: str, text: str) -> float:
         time = -1.0
     if not 0.0 <= time < np.inf:
         raise SettingError(
-            f"behind the @ of '{name}' is a time in s, 'switch1', 'switch2' ... or 'scale', not '{text}'"
+            f"expected a time in s, 'switch1', 'switch2' ... or 'scale' after the @ of '{name}', found '{text}'"
         )
     return time
 
@@ -177,8 +177,9 @@ def check_nodes(controls: Mapping[int, Control], interpolation: str, to: float) 
         # Beyond its nodes a cubic would be extrapolated.
         if len(times) < MIN_CUBIC_NODES or times[0] > 0.0 or times[-1] < to * (1.0 - 1e-9):
             raise SettingError(
-                f"a cubic needs {MIN_CUBIC_NODES} nodes or more, the first at 0 and the last at the end of the runs, "
-                f"{to:g} s; those of '{actuator}' are at {', '.join(f'{time:g}' for time in times)} s"
+                f"cubic interpolation needs at least {MIN_CUBIC_NODES} nodes, the first at 0 s and the last "
+                "at the end of the runs, "
+                f"{to:g} s; the nodes of '{actuator}' are at {', '.join(f'{time:g}' for time in times)} s"
             )
 
 
@@ -219,7 +220,7 @@ def make_controller(model: Model, controls: Mapping[str, Any]) -> PrescribedCont
             controller.ControlFunctions.objects.append(Constant(value=float(control)))
         else:
             raise SettingError(
-                f"the control of '{name}' is {control!r}; a sweep takes numbers and tables"
+                f"the control of '{name}' is {control!r}; a sweep accepts only numbers and tables as controls"
             )
     return controller
 
@@ -331,7 +332,7 @@ class VariedControls:
         # Scaling nothing would leave all runs equal, without a message.
         if len(self._puts) == count_before:
             raise SettingError(
-                f"no function of a PrescribedController makes the control of '{actuator}', so that there is nothing to "
+                f"no PrescribedController sets the control of '{actuator}' by a function, so there is no control to "
                 "scale; give one with --controls"
             )
 

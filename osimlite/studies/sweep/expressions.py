@@ -95,7 +95,7 @@ class ExpressionMeasure:
                 return match[0]
             if match["word"]:
                 raise SettingError(
-                    f"the measure '{text}' has no '{match[0]}' to look at{suggest_name(match[0], quantities)}"
+                    f"the measure '{text}' names the unknown quantity '{match[0]}'{suggest_name(match[0], quantities)}"
                 )
             self._quantities.append(quantities[match[0]])
             self.names.add(match[0])
@@ -110,7 +110,7 @@ class ExpressionMeasure:
             self._tree = parse_expression(python.strip()).body
         except SyntaxError:
             raise SettingError(
-                f"the measure '{text}' is not an expression; write it as in max(NAME) - 2*end(NAME)"
+                f"the measure '{text}' is not an expression; an example of one is max(NAME) - 2*end(NAME)"
             ) from None
         if _measure_depth(self._tree) > MAX_DEPTH:
             raise SettingError(
@@ -119,7 +119,7 @@ class ExpressionMeasure:
         # A trial with two moments shows whether the result is a number or a history.
         if np.ndim(self._evaluate_columns(np.arange(2.0), [np.ones(2)] * len(self._quantities))):
             raise SettingError(
-                f"the measure '{text}' changes during a run; say what of it, as in max({text})"
+                f"the measure '{text}' changes during a run; reduce it to one number, for example with max({text})"
             )
 
     def evaluate(self, engine: Any, moments: Moments) -> float:
@@ -163,7 +163,7 @@ class ExpressionMeasure:
                 # Adding zeros makes a history of a constant.
                 return REDUCTIONS[name](times, evaluate(argument) + np.zeros(len(times)))
         raise SettingError(
-            f"the measure '{self._text}' is not an expression; there are + - * / ^ and functions of one number"
+            f"the measure '{self._text}' is not a valid expression; it may contain + - * / ^ and functions of one argument"
         )
 
 

@@ -74,11 +74,12 @@ class Gradients:
     def __init__(self, plan: Plan) -> None:
         if plan.engine != "compiled" or plan.integrator != MERSON:
             raise SettingError(
-                "--method gradient follows Merson's steps of the compiled engine; remove --engine and --integrator"
+                "--method gradient needs the compiled engine and the integrator 'merson', the defaults; "
+                "remove --engine and --integrator"
             )
         if plan.controller is not None:
             raise SettingError(
-                "controls that a controller holds between its steps have no derivatives; choose another --method"
+                "--method gradient does not support controllers, whose controls have no derivatives; choose another --method"
             )
         if plan.stops:
             raise SettingError(
@@ -187,8 +188,9 @@ class Gradients:
                 free_indices[int(np.argmin(np.isfinite(result)))]
             ].name
             raise SimulationError(
-                f"'{self._measure.name}' has no derivative by '{variable_name}'; it may look at more than states: take another "
-                "measure, or another --method"
+                f"'{self._measure.name}' has no derivative with respect to '{variable_name}'; it may depend "
+                "on more than the states. Choose "
+                "another measure, or another --method"
             )
         return result
 

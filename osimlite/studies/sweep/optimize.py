@@ -166,7 +166,7 @@ def optimize(
         raise SettingError("there is nothing to search: every variable has one value only")
     if budget < 1 or (popsize is not None and popsize < 2):
         raise SettingError(
-            "a search has a budget of at least one run, and a population of at least two"
+            "a search needs a budget of at least 1 run, and a population of at least 2"
         )
     if not 0 <= seed < 2**32:
         raise SettingError(f"the seed is a whole number from 0 to {2**32 - 1}, not {seed}")
@@ -222,7 +222,7 @@ def optimize(
             raise describe_interruption(partial, format_count(partial.rows, "run")) from None
         finally:
             partial.close()
-    ending = ending or f"as many runs as were allowed: {evaluations.count}"
+    ending = ending or f"the budget of {evaluations.count} runs is used up"
     return _finish_search(output_folder, plan, variants, evaluations, settings, ending)
 
 
@@ -237,7 +237,7 @@ def _resolve_start(
     if not isinstance(start, Mapping):
         if start is not None and len(start) != len(plan.variables):
             raise SettingError(
-                f"the start has one number for each of the {len(plan.variables)} variables, not {len(start)}"
+                f"the start must have one number for each of the {len(plan.variables)} variables, found {len(start)}"
             )
         start = dict(zip((variable.name for variable in plan.variables), start or (), strict=False))
     result = []
@@ -274,7 +274,7 @@ def read_best_values(folder: str | Path) -> dict[str, float]:
         return {name: float(value) for name, value in json.loads(read_file(path))["values"].items()}
     except (OsimliteError, ValueError, LookupError, AttributeError, TypeError, RecursionError):
         raise OsimliteError(
-            f"'{path}' is not the summary of a search; name the folder of one"
+            f"'{path}' is not the summary of a search; name the results folder of a search"
         ) from None
 
 
@@ -299,7 +299,7 @@ def _open_history(
         # A smaller budget must not discard finished evaluations.
         if earlier_table.num_rows > evaluations.budget:
             raise SettingError(
-                f"'{path}' has {earlier_table.num_rows} runs of this search, more than are asked for now; keep them with "
+                f"'{path}' has {earlier_table.num_rows} runs of this search, more than the budget now; keep them with "
                 "--resume, or replace them with --force"
             )
     if not force and not path.exists() and not get_partial_path(path).exists():

@@ -140,7 +140,7 @@ class Plan(IntegrationOptions):
         # Lambdas and local functions raise one of these, depending on the version of Python.
         except (pickle.PicklingError, AttributeError, TypeError):
             raise SettingError(
-                "a function of the sweep cannot be sent to other processes; put it into a module and name it "
+                "a function of the sweep cannot be sent to other processes; put it into a module, and pass it as "
                 "module:function"
             ) from None
 
@@ -252,7 +252,7 @@ def plan(
         gains = controller.gains(model, Simulation(model, **simulation_options).engine)
         if not (vary or gains):
             raise SettingError(
-                "say what to vary; the controller has no parameters, which are written as ~2<0,20>"
+                "there is nothing to vary, because the controller has no parameters (written as ~2<0,20>); add --vary"
             )
     result = resolve_variables(vary, model, mechanism, parameters, gains)
     # Nothing varies by name: all other parameters of the controller do.
@@ -289,10 +289,10 @@ def plan(
         ("report_interval", made_plan.report_interval),
     ):
         if value is not None and not (isfinite(value) and value > 0.0):
-            raise SettingError(f"'{name}' is a positive number, not {value:g}")
+            raise SettingError(f"'{name}' must be a positive number, not {value:g}")
     # The accuracy is a relative error.
     if made_plan.accuracy >= 1.0:
-        raise SettingError(f"'accuracy' is less than 1, not {made_plan.accuracy:g}")
+        raise SettingError(f"'accuracy' must be less than 1, not {made_plan.accuracy:g}")
     made_plan.check_integration()
     targets = {index: variable.target for index, variable in enumerate(result)}
     nodes = {index: target for index, target in targets.items() if isinstance(target, Control)}
@@ -311,7 +311,8 @@ def _read_bounds(gain: Gain) -> tuple[float, float]:
     """Return the bounds of a parameter of the controller as a range."""
     if not (isfinite(gain.low) and isfinite(gain.high)):
         raise SettingError(
-            f"the parameter '{gain.name}' has no bounds, as in 1~0.1<0,2>; vary it as in {gain.name}=0:2"
+            f"the parameter '{gain.name}' has no bounds, such as <0,2> in 1~0.1<0,2>; give its range, for "
+            f"example --vary {gain.name}=0:2"
         )
     return gain.low, gain.high
 
@@ -345,10 +346,12 @@ def _make_stop(mechanism: Mechanism, name: str, level_text: float | str, is_belo
     # A stop at a coordinate that does not move can only be a mistake.
     if infos[name].locked:
         raise SettingError(
-            f"the coordinate '{name}' is locked, so that it stops nothing; name one that moves"
+            f"the coordinate '{name}' is locked, so it cannot stop a run; name a coordinate that moves"
         )
     level = convert_value(mechanism, name, level_text)
     if not isfinite(level):
-        raise SettingError(f"the level of '{name}' that stops a run is a number, not {level_text}")
+        raise SettingError(
+            f"the value of '{name}' that stops a run must be a number, not {level_text}"
+        )
     warn_of_unit(describe_suspect_value(infos[name], name, level_text))
     return Stop(name, level, is_below)

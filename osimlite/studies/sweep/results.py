@@ -84,7 +84,8 @@ def settings_of(path: str | Path) -> dict[str, Any]:
             return _parse_settings(pq.read_schema(stream))
     except (ValueError, OSError):
         raise OsimliteError(
-            "this file is not the results of a sweep; give them another name", file=str(path)
+            "this file does not contain results of a sweep; name another output file",
+            file=str(path),
         ) from None
 
 
@@ -157,8 +158,9 @@ def refuse_other_settings(
     """
     if differences := describe_differences(old_settings, settings):
         raise SettingError(
-            f"'{path}' has results of other settings: {join_words(differences)}; name another place with -o, or replace them "
-            "with --force"
+            f"'{path}' has results that were computed with other settings: {join_words(differences)}; name "
+            "another output with -o, or replace "
+            "the results with --force"
         )
 
 
@@ -171,7 +173,7 @@ def refuse_overwrite(paths: Iterable[Path]) -> None:
     for path in paths:
         if path.exists():
             raise SettingError(
-                f"'{path}' is not from such a search; name another folder with -o, or replace it with --force"
+                f"'{path}' was not written by such a search; name another folder with -o, or replace it with --force"
             )
 
 

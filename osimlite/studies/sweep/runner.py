@@ -107,8 +107,8 @@ class _Observers:
         for spec in expressions:
             for name in sorted(ExpressionMeasure(spec, engine).names & list_driven_names(engine)):
                 raise SettingError(
-                    f"the measure '{spec}' looks at '{name}', which the controller has a part in; of runs with a "
-                    "controller a sweep keeps states alone"
+                    f"the measure '{spec}' needs '{name}', which depends on the controller; in runs with a "
+                    "controller, measures can use states only"
                 )
         # Levels of the plan act on all runs, besides the watches of measures.
         stops = [
@@ -130,7 +130,7 @@ class _Observers:
         )
         # Only the compiled engine stops runs at events.
         if self.watches and plan.engine != "compiled":
-            raise SettingError("what stops a run needs --engine compiled")
+            raise SettingError("--stop-below and --stop-above need --engine compiled")
         # The engine detects no events unless it may record at least one.
         event_counts = [measure.event_count(plan.to) for measure in self.measures]
         self.most_events = max([*event_counts, 1 if self.watches else 0])
@@ -297,14 +297,14 @@ class Runner:
                 endings.append(
                     (
                         FAILED,
-                        f"{MAX_INTEGRATOR_STEPS} steps came no further than t = {t:.9g} s; ask for less accuracy",
+                        f"{MAX_INTEGRATOR_STEPS} integrator steps reach only t = {t:.9g} s; use a larger accuracy value",
                     )
                 )
             else:
                 endings.append(
                     (
                         FAILED,
-                        f"the motion cannot be computed beyond t = {t:.9g} s; ask for more accuracy",
+                        f"the motion cannot be computed beyond t = {t:.9g} s; use a smaller accuracy value",
                     )
                 )
         return runs, endings

@@ -124,8 +124,9 @@ def choose_samples(
     # Both would fix the number of runs, in different ways.
     if sampler is None and count is not None and with_values:
         raise SettingError(
-            f"--samples says how many runs are drawn, the COUNT in the range of {join_words(with_values)} how many values "
-            "a grid has; leave out one of the two, or name the --sampler"
+            "--samples sets the number of runs of a random sampler, and the COUNT in the range of "
+            f"{join_words(with_values)} the size "
+            "of a grid; leave out one of the two, or select a --sampler"
         )
     if sampler is None:
         sampler = (
@@ -136,7 +137,7 @@ def choose_samples(
     if sampler not in SAMPLERS:
         raise SettingError(f"there is no sampler '{sampler}'{suggest_or_list(sampler, SAMPLERS)}")
     if seed < 0:
-        raise SettingError(f"the seed is a whole number from 0 on, not {seed}")
+        raise SettingError(f"the seed must be a whole number of at least 0, not {seed}")
     if sampler == "grid":
         uncounted = [variable.name for variable in varied_variables if variable.count is None]
         if uncounted:
@@ -153,10 +154,10 @@ def choose_samples(
     if count is None:
         raise SettingError("the number of samples is missing; add it, as in --samples 1000")
     if count < 1:
-        raise SettingError(f"the number of samples is above zero, not {count}")
+        raise SettingError(f"the number of samples must be at least 1, not {count}")
     if sampler == "sobol" and count > MAX_SOBOL_POINTS:
         raise SettingError(
-            f"Sobol's sequence has {MAX_SOBOL_POINTS} points; take --sampler random for more"
+            f"Sobol's sequence has only {MAX_SOBOL_POINTS} points; use --sampler random for more samples"
         )
     return Samples(tuple(variables), sampler, count, seed)
 

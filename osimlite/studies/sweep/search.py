@@ -242,4 +242,6 @@ def find_method(name: str) -> Callable[[CostFunction, Search], str]:
 def _require_two_variables(search: Search) -> None:
     """Refuse a single variable, whose covariance matrix CMA-ES cannot adapt."""
     if len(search.start) < 2:
-        raise SettingError("cma searches two variables or more; take --method nelder-mead for one")
+        raise SettingError(
+            "--method cma needs at least two variables; use --method nelder-mead for one variable"
+        )

@@ -274,7 +274,7 @@ def resolve_variables(
             # Two variables of one number would depend on the order of application.
             if single_target in name_by_target:
                 raise SettingError(
-                    f"'{name_by_target[single_target]}' and '{resolved.name}' are the same number; vary one of them"
+                    f"'{name_by_target[single_target]}' and '{resolved.name}' are the same quantity; vary one of them"
                 )
             name_by_target[single_target] = resolved.name
     return tuple(result)
@@ -289,8 +289,8 @@ def reject_grid_ranges(variables: Sequence[Variable]) -> None:
     for variable in variables:
         if variable.count is not None and not variable.is_fixed:
             raise SettingError(
-                f"the range of '{variable.name}' has {variable.count} grid points, which only a sweep uses; "
-                "a search takes any value of it: leave the number out"
+                f"the range of '{variable.name}' has {variable.count} grid points, but only a sweep "
+                "uses a grid; leave out the number of points"
             )
 
 
@@ -369,7 +369,7 @@ def _describe_unknown_name(
     known_names += list_property_paths(model) if "/" in name else []
     suggestion = suggest_name(name, known_names)
     return SettingError(
-        f"there is no coordinate, parameter, control or number '{name}' to vary{suggestion}"
+        f"the model has no coordinate, parameter, control or numeric property '{name}' to vary{suggestion}"
     )
 
 
@@ -381,14 +381,15 @@ def _list_coordinates(
     locked = [info for info in infos if info.locked]
     if locked and is_speed:
         raise SettingError(
-            f"the coordinate '{locked[0].name}' is locked, so that it has no speed; unlock it in the model"
+            f"the coordinate '{locked[0].name}' is locked, so it has no speed; unlock it in the model"
         )
     if not locked:
         return Start(tuple(info.path for info in infos), is_speed), unit
     # A locked coordinate is a property, a free one an initial value; one variable cannot be both.
     if len(locked) < len(infos):
         raise SettingError(
-            f"of '{name}', '{locked[0].name}' is locked and others are not; vary these one by one"
+            f"'{name}' matches the locked coordinate '{locked[0].name}' and coordinates that move; vary the "
+            "moving ones by their names"
         )
     return Property(
         find_properties(model, ",".join(info.path for info in infos) + "/default_value")
@@ -419,7 +420,7 @@ def _make_variable(name: str, target: Target, unit: str, value_range: Range) -> 
         text = str(fields.pop())
         if not text.strip().isdigit() or int(text) < 1:
             raise SettingError(
-                f"the number of values of '{name}' is a whole number above zero, not '{text}'"
+                f"the number of values of '{name}' must be a whole number of at least 1, not '{text}'"
             )
         count = int(text)
     if len(fields) not in (1, 2):
@@ -433,15 +434,15 @@ def _make_variable(name: str, target: Target, unit: str, value_range: Range) -> 
         count = 1
     if lower > upper:
         raise SettingError(
-            f"the range of '{name}' ends below its start: {lower:g} to {upper:g}; turn it round"
+            f"the range of '{name}' ends below its start: {lower:g} to {upper:g}; write the lower end first"
         )
     if is_log and lower <= 0.0:
         raise SettingError(
-            f"'{name}' is spread by its logarithm, so that it must be above zero, not {lower:g}"
+            f"the logarithmic range of '{name}' must be above 0, but begins at {lower:g}"
         )
     if count is not None and count > 1 and lower == upper:
         raise SettingError(
-            f"'{name}' cannot have {count} values between {lower:g} and {upper:g}; give it one"
+            f"'{name}' cannot have {count} values between {lower:g} and {upper:g}; give one value"
         )
     if count == 1 and lower != upper:
         raise SettingError(f"'{name}' has one value only; give it as {name}=VALUE")
@@ -512,6 +513,8 @@ def _parse_number(name: str, number_or_text: object, unit: str) -> float:
         return quantity.value
     if unit == "parameter":
         raise SettingError(
-            f"'{name}' is a parameter of a function or a controller, whose unit only that knows; give a plain number"
+            f"'{name}' is a parameter of a function or controller, whose unit osimlite does not know; give a plain number"
         )
-    raise SettingError(f"'{name}' is in {unit or 'no unit'}, which '{number_or_text}' does not fit")
+    raise SettingError(
+        f"'{name}' {f'is in {unit}' if unit else 'has no unit'}, but '{number_or_text}' has another unit"
+    )

@@ -172,7 +172,9 @@ class Variants:
             for index, path, is_speed in self._starts:
                 coordinate = engine.mechanism.coordinate_index(path)
                 if coordinate not in engine.order:
-                    raise SettingError(f"'{path}' is locked in this model, so that it has no start")
+                    raise SettingError(
+                        f"'{path}' is locked in this model, so it has no initial value"
+                    )
                 number = engine.order.index(coordinate)
                 row[number + (len(engine.order) if is_speed else 0)] = values[index]
         return self.prepare_states(engine, [variant], row[None])[0]

@@ -121,7 +121,9 @@ def test_another_walker_is_spared_unless_forced_and_the_same_seed_finds_the_same
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
     for name in ("best.osim", "cycles.csv", "summary.json"):
         (tmp_path / name).write_text("mine")
-        with pytest.raises(SettingError, match=rf"{name}' is not from such a search; .*--force"):
+        with pytest.raises(
+            SettingError, match=rf"{name}' was not written by such a search; .*--force"
+        ):
             find_gait(plan(dynamic_walker(), NEAR), tmp_path, **FEW)
         assert [path.read_text() for path in tmp_path.iterdir()] == ["mine"]
         (tmp_path / name).unlink()
@@ -133,14 +135,14 @@ def test_another_walker_is_spared_unless_forced_and_the_same_seed_finds_the_same
 @pytest.mark.parametrize(
     ("said", "choice"),
     [
-        ("seed is a whole number from 0 to", {"seed": -1}),
-        ("seed is a whole number from 0 to", {"seed": 2**32 - 4}),
-        ("'samples' is a whole number from 1 on", {"samples": 0}),
-        ("'budget' is a whole number from 0 on", {"budget": -1}),
-        ("'perturb' is a positive number", {"perturb": float("nan")}),
-        ("'stable' is a positive number", {"stable": 0.0}),
-        ("'digits' is a whole number from 1 to 17", {"digits": 0}),
-        ("'start_digits' is a whole number from 1 to 17", {"start_digits": 18}),
+        ("seed must be a whole number from 0 to", {"seed": -1}),
+        ("seed must be a whole number from 0 to", {"seed": 2**32 - 4}),
+        ("'samples' must be a whole number of at least 1", {"samples": 0}),
+        ("'budget' must be a whole number of at least 0", {"budget": -1}),
+        ("'perturb' must be a positive number", {"perturb": float("nan")}),
+        ("'stable' must be a positive number", {"stable": 0.0}),
+        ("'digits' must be a whole number from 1 to 17", {"digits": 0}),
+        ("'start_digits' must be a whole number from 1 to 17", {"start_digits": 18}),
     ],
 )
 def test_settings_are_checked_before_the_search(said, choice, tmp_path):
@@ -154,7 +156,9 @@ def test_what_cannot_be_searched_leaves_no_folder(tmp_path):
     model.add(
         PointConstraint(name="held", socket_body_1="/ground", socket_body_2="/bodyset/Pelvis")
     )
-    with pytest.raises(UnsupportedError, match="some of which /constraintset/held takes away"):
+    with pytest.raises(
+        UnsupportedError, match="constraints or prescribed coordinates: /constraintset/held"
+    ):
         find_gait(plan(model, NEAR), tmp_path / "new", **FEW)
     (tmp_path / "file").write_text("mine")
     with pytest.raises(OsimliteError, match="this is a file, not a folder"):
@@ -250,7 +254,7 @@ def test_a_search_that_gets_nowhere_keeps_the_first_cycle():
 
 
 def test_a_search_needs_random_starts():
-    with pytest.raises(SettingError, match="vary some values and speeds"):
+    with pytest.raises(SettingError, match="vary the initial values or speeds"):
         CycleSearch(plan(dynamic_walker(), {INERTIA: (0.05, 0.1)}))
     with pytest.raises(SettingError, match="'RHip_rz' has 3 grid points"):
         CycleSearch(plan(dynamic_walker(), {"RHip_rz": "0.05:0.1:3"}))

@@ -55,7 +55,7 @@ def test_feet_may_be_given(engine):
     with pytest.raises(OsimliteError, match="two feet"):
         find_footing(engine, ["RFootForce"])
     for feet in (["RFootForce", "RFootForce"], ["RFootForce", "LFootForce + RFootForce"]):
-        with pytest.raises(OsimliteError, match="'RFootForce' is given to the feet twice"):
+        with pytest.raises(OsimliteError, match="'RFootForce' is named for both feet"):
             find_footing(engine, feet)
 
 

@@ -123,7 +123,7 @@ def test_any_model_has_a_task(tmp_path) -> None:
         gymnasium.make(
             "osimlite/Model-v0", model=furthest_walker(), reward=lambda before, after: 0.0
         )
-    with pytest.raises(gymnasium.error.Error, match="give a task"):
+    with pytest.raises(gymnasium.error.Error, match="pass a task"):
         gymnasium.make("osimlite/Model-v0")
 
 
@@ -131,9 +131,9 @@ def test_any_model_has_a_task(tmp_path) -> None:
     ("choices", "words"),
     [
         ({"secnods": 1.0}, "a task has no 'secnods'.*did you mean 'seconds'"),
-        ({"render_mode": "human"}, "pictures come as 'rgb_array', not as 'human'"),
-        ({"hidden": ("shoulder",)}, "nothing is called 'shoulder' that could be hidden"),
-        ({"model": "arm.osim"}, "this environment has its model"),
+        ({"render_mode": "human"}, "must be 'rgb_array', not 'human'"),
+        ({"hidden": ("shoulder",)}, "has no state 'shoulder' to hide"),
+        ({"model": "arm.osim"}, "this environment has a fixed model"),
     ],
 )
 def test_what_an_environment_does_not_know_is_refused(choices, words) -> None:

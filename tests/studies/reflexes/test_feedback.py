@@ -275,14 +275,14 @@ def test_a_run_goes_on_by_the_gains_that_it_began_with(
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ({"DofReflex": {}}, "a controller is needed"),
+        ({"DofReflex": {}}, "a controller is required"),
         (
             {"ReflexController": [REFLEXES] * 2},
-            "'ReflexController' stands beside 'ReflexController'; join them",
+            "'ReflexController' follows 'ReflexController', but only one is allowed",
         ),
         (
             {"ReflexController": REFLEXES, "CompositeController": {}},
-            "'CompositeController' stands beside 'Reflex",
+            "'CompositeController' follows 'Reflex",
         ),
         (
             {"ReflexController": REFLEXES, "fixed_control_step_size": 0},
@@ -298,17 +298,17 @@ def test_a_run_goes_on_by_the_gains_that_it_began_with(
                     "DofReflex": {"target": "motor", "source": "elbow", "delay": 11}
                 }
             },
-            "more than 10 s",
+            "the maximum is 10 s",
         ),
         (
             {"ReflexController": REFLEXES, "measure": 1},
-            "'measure' of a file of a controller is not done here",
+            "does not support 'measure' of a file of a controller",
         ),
         (
             {"CompositeController": {"NoiseControler": {}}},
             "'NoiseControler'.*did you mean 'NoiseController'",
         ),
-        ({"CompositeController": {"NoiseController": [{}, {}]}}, "a NoiseController already"),
+        ({"CompositeController": {"NoiseController": [{}, {}]}}, "a second NoiseController"),
         (
             {"CompositeController": {"NoiseController": {"base_noice": 1}}},
             "'base_noice' of a NoiseController",
@@ -427,7 +427,7 @@ def test_noisy_walks_alone_are_those_among_many(tmp_path) -> None:
     file.write_text(f"{head} CompositeController {{ {inner} {noise} }} {measures}")
     scenario = Scenario(file)
     best, name = scenario.best(), "S00011.vasti.KF"
-    with pytest.warns(UserWarning, match="numbers depend on the compiler of SCONE"):
+    with pytest.warns(UserWarning, match="those of SCONE depend on its compiler"):
         together = scenario.walk(best | {name: best[name] * np.array([1.0, 1.01])}, 2, duration=1.0)
         alone = [
             scenario.walk(best | {name: best[name] * factor}, duration=1.0)
@@ -463,7 +463,7 @@ def test_many_runs_are_single_ones_bit_for_bit(model) -> None:
         given = {"controls": {"motor": 0.1}, "initial": {"elbow": start}, "engine": "compiled"}
         alone = simulate(own, 0.3, controller=feedback, **given)
         assert together.measures["elbow/value"][k] == alone.values[-1, -1]
-    with pytest.raises(OsimliteError, match="looks at 'motor', which the controller has a part in"):
+    with pytest.raises(OsimliteError, match="needs 'motor', which depends on the controller"):
         Runner(plan(model, {"elbow": "0.3:1.5"}, measures=("max(motor)",), controller=feedback))
 
 
@@ -575,9 +575,9 @@ def test_a_search_for_gains(model, tmp_path) -> None:
         (["--method", "gradient"], "have no derivatives"),
         (
             ["--vary", "motor-elbow.KQ=0:1"],
-            "number 'motor-elbow.KQ' to vary; did you mean 'motor-elbow.KP'",
+            "numeric property 'motor-elbow.KQ' to vary; did you mean 'motor-elbow.KP'",
         ),
-        (["--vary", "motor-elbow.KP=0:1deg"], "whose unit only that knows"),
+        (["--vary", "motor-elbow.KP=0:1deg"], "whose unit osimlite does not know"),
     ):
         refused = command(*words, *more, "-o", tmp_path / "other")
         assert refused.code != 0 and told in refused.err.replace("\n", " ")
@@ -588,4 +588,4 @@ def test_a_search_for_gains(model, tmp_path) -> None:
         text.replace("~", "").replace("<0,9>", "").replace("<0,1>", "")
     )
     refused = command(*words, "-o", tmp_path / "other")
-    assert refused.code != 0 and "say what to vary" in refused.err
+    assert refused.code != 0 and "there is nothing to vary" in refused.err

@@ -24,7 +24,7 @@ def test_the_rest_follows_from_what_is_set():
     rows = np.array([(0.8, -0.5), (-0.3, -0.25), (0.1, 3.0)])
     result = Runner(made).run(rows)
     assert result.status == ["done", "done", "failed"]
-    assert "no pose of 'pins' near the given one fulfils /constraintset/loop" in str(
+    assert "no pose of 'pins' near the requested pose fulfils /constraintset/loop" in str(
         result.reasons[2]
     )
     other = Runner(replace(made, engine="bullet")).run(rows)

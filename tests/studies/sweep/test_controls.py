@@ -216,13 +216,16 @@ def test_names():
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("mu/control@soon", "is a time in s, 'switch1', 'switch2' ... or 'scale', not 'soon'"),
-        ("mu/control@-1", "is a time in s"),
-        ("mu/control@", "is a time in s"),
-        ("mu/control@0:1", "@FIRST:LAST:COUNT, with a count of two or more"),
+        ("mu/control@soon", "expected a time in s, 'switch1', 'switch2' ... or 'scale' after"),
+        ("mu/control@-1", "expected a time in s"),
+        ("mu/control@", "expected a time in s"),
+        ("mu/control@0:1", "@FIRST:LAST:COUNT, with a COUNT of at least 2"),
         ("mo/control@0.1", "did you mean 'mu/control'"),
-        ("{n*}/control", r"control or number '\{n\*\}/control' to vary"),
-        ("mu,mo/control", "there is no coordinate, parameter, control or number 'mu,mo/control'"),
+        ("{n*}/control", r"control or numeric property '\{n\*\}/control' to vary"),
+        (
+            "mu,mo/control",
+            "has no coordinate, parameter, control or numeric property 'mu,mo/control'",
+        ),
         ("mu@0.1", "'mu@0.1' is an actuator: vary 'mu/control'"),
         ("mu/max_isometric_forc", "did you mean 'mu/max_isometric_force'"),
     ],
@@ -233,18 +236,19 @@ def test_names_that_mean_nothing(name, words):
 
 
 def test_what_cannot_be_is_said():
-    with pytest.raises(SettingError, match="the same number"):
+    with pytest.raises(SettingError, match="the same quantity"):
         plan(pulled(), {"mu/control@0.1": (0.0, 1.0), "m*/control@0.1": (0.0, 1.0)})
     with pytest.raises(
         SettingError, match="there is no interpolation 'cubed'; did you mean 'cubic'"
     ):
         plan(pulled(), {"mu/control@0.1": (0.0, 1.0)}, interpolation="cubed")
     with pytest.raises(
-        SettingError, match=r"needs 4 nodes or more, .* '/forceset/mu' are at 0, 0.1, 0.2, 0.3 s"
+        SettingError, match=r"needs at least 4 nodes, .* '/forceset/mu' are at 0, 0.1, 0.2, 0.3 s"
     ):
         plan(pulled(), {"mu/control@0:0.3:4": (0.0, 1.0)}, interpolation="cubic", to=0.5)
     with pytest.raises(
-        SettingError, match="'/forceset/motor', so that there is nothing to scale; give one with"
+        SettingError,
+        match="'/forceset/motor' by a function, so there is no control to scale; give one with",
     ):
         Variants(plan(pulled(), {"motor/control@scale": (0.0, 1.0)}))
     with pytest.raises(SettingError, match="no actuator 'moter' to control; did you mean 'motor'"):

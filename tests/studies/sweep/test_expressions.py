@@ -148,17 +148,17 @@ def test_a_run_that_is_stopped_is_looked_at_up_to_its_end(walker):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("max(y)", "has no 'y' to look at"),
-        ("max(mu/activaton)", "has no 'activaton' to look at"),
+        ("max(y)", "the unknown quantity 'y'"),
+        ("max(mu/activaton)", "the unknown quantity 'activaton'"),
         ("max(center_of_mas_Y)", "did you mean 'center_of_mass_Y'"),
-        ("max(x) + (x)", "changes during a run; say what of it, as in max"),
-        ("max(x", "is not an expression; write it"),
-        ("max(x" + "+x" * 20000 + ")", "is not an expression; write it"),
+        ("max(x) + (x)", "changes during a run; reduce it to one number, for example with max"),
+        ("max(x", "is not an expression; an example"),
+        ("max(x" + "+x" * 20000 + ")", "is not an expression; an example"),
         ("max(x" + "+x" * 300 + ")", "nests more than 200 levels deep; write it shorter"),
-        ("max(x, 1)", "is not an expression; there are"),
-        ("(1, 2)", "is not an expression; there are"),
-        ("open(1)", "has no 'open' to look at"),
-        ("max(x)[0]", "is not an expression; there are"),
+        ("max(x, 1)", "is not a valid expression; it may contain"),
+        ("(1, 2)", "is not a valid expression; it may contain"),
+        ("open(1)", "the unknown quantity 'open'"),
+        ("max(x)[0]", "is not a valid expression; it may contain"),
     ],
 )
 def test_what_is_none_is_told(text, words):

@@ -272,8 +272,8 @@ def test_failed_runs_are_worse_than_all_others(walker, tmp_path):
 def test_what_cannot_be_is_said(made, walker, tmp_path):
     for words, choices in [
         ("did you mean 'cma'", {"method": "cmaes"}),
-        ("budget of at least one", {"budget": 0}),
-        ("population of at least two", {"popsize": 1}),
+        ("budget of at least 1", {"budget": 0}),
+        ("population of at least 2", {"popsize": 1}),
         ("is positive", {"sigma": 0.0}),
         ("seed is a whole number", {"seed": -1}),
         ("tolerance is", {"tolerance": -1.0}),
@@ -284,7 +284,7 @@ def test_what_cannot_be_is_said(made, walker, tmp_path):
     ]:
         with pytest.raises(SettingError, match=words):
             optimize(made, DISTANCE, tmp_path, **choices)
-    with pytest.raises(SettingError, match="take --method nelder-mead"):
+    with pytest.raises(SettingError, match="use --method nelder-mead"):
         optimize(plan(walker, {"RHip_rz": (0.3, 0.5)}), DISTANCE, tmp_path)
     with pytest.raises(
         SettingError, match=r"'RHip_rz' has 3 grid points, .*: leave the number out"
@@ -300,7 +300,7 @@ def test_what_cannot_be_is_said(made, walker, tmp_path):
 @pytest.mark.parametrize("name", [BEST_FILE, SUMMARY_FILE])
 def test_files_of_others_are_spared_unless_forced(made, tmp_path, name):
     (tmp_path / name).write_text("mine")
-    with pytest.raises(SettingError, match=rf"{name}' is not from such a search; .*--force"):
+    with pytest.raises(SettingError, match=rf"{name}' was not written by such a search; .*--force"):
         optimize(made, DISTANCE, tmp_path, budget=4, popsize=4)
     assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [(name, "mine")]
     assert optimize(made, DISTANCE, tmp_path, budget=4, popsize=4, force=True).evaluations == 4
@@ -309,6 +309,6 @@ def test_files_of_others_are_spared_unless_forced(made, tmp_path, name):
 def test_a_search_that_cannot_begin_leaves_no_folder(made, walker, tmp_path):
     with pytest.raises(SettingError, match="did you mean 'distance'"):
         optimize(made, Objective("distanc"), tmp_path / "new")
-    with pytest.raises(SettingError, match="take --method nelder-mead"):
+    with pytest.raises(SettingError, match="use --method nelder-mead"):
         optimize(plan(walker, {"RHip_rz": (0.3, 0.5)}), DISTANCE, tmp_path / "new")
     assert not list(tmp_path.iterdir())

@@ -170,7 +170,7 @@ def test_other_settings_are_told_apart(made, walker, tmp_path):
     with pytest.raises(SettingError, match="is not an interrupted sweep"):
         sweep(made, chosen, tmp_path / "x.parquet", resume=True)
     sweep(made, chosen, path, resume=True)
-    with pytest.raises(SettingError, match=r"samples \(40 before, 41 now\); name another place"):
+    with pytest.raises(SettingError, match=r"samples \(40 before, 41 now\); name another output"):
         sweep(made, choose_samples(made.variables, "sobol", 41, 5), path, resume=True)
 
 
@@ -192,7 +192,7 @@ def test_finished_results_are_spared_unless_forced(made, tmp_path):
     assert sweep(made, more, path, resume=True).before > 0
     assert pq.read_table(path).num_rows == 8
     path.write_text("mine")
-    with pytest.raises(OsimliteError, match="not the results of a sweep"):
+    with pytest.raises(OsimliteError, match="does not contain results of a sweep"):
         sweep(made, more, path)
     assert path.read_text() == "mine"
     sweep(made, more, path, force=True)
@@ -344,7 +344,7 @@ def test_damaged_results_are_told(tmp_path):
 def test_settings_of_another_type_are_none(tmp_path, text):
     table = make_schema({"run": "int64"}, {}).with_metadata({results.SETTINGS_KEY: text})
     pq.write_table(table.empty_table(), tmp_path / "r")
-    with pytest.raises(OsimliteError, match="not the results of a sweep"):
+    with pytest.raises(OsimliteError, match="does not contain results of a sweep"):
         results.settings_of(tmp_path / "r")
 
 

@@ -346,7 +346,7 @@ def test_stops_may_carry_a_unit(walker):
     assert made.stops == (Stop("Pelvis_ty", 0.5), Stop("LHip_rz", np.radians(30), False))
     for choices, words in (
         ({"below": {"Pelvis_ty": "70deg"}}, "give '70deg' in m, cm or mm"),
-        ({"above": {"LHip_rz": float("nan")}}, "is a number"),
+        ({"above": {"LHip_rz": float("nan")}}, "must be a number"),
         ({"above": {"LHip": 1.0}}, "did you mean 'LHip_rz'"),
         ({"stops": (Stop("platform_rz", 1.0),)}, "'platform_rz' is locked"),
     ):
@@ -363,9 +363,9 @@ def test_degrees_taken_for_radians_are_warned_of(walker):
 
 
 def test_what_is_wrong_is_said_before_anything_runs(walker):
-    with pytest.raises(SettingError, match="'to' is a positive number"):
+    with pytest.raises(SettingError, match="'to' must be a positive number"):
         plan(walker, {"RHip_rz": (0.0, 1.0)}, to=-1.0)
-    with pytest.raises(SettingError, match="'accuracy' is less than 1, not 2"):
+    with pytest.raises(SettingError, match="'accuracy' must be less than 1, not 2"):
         plan(walker, {"RHip_rz": (0.0, 1.0)}, accuracy=2.0)
     with pytest.raises(SettingError, match="did you mean 'distance'"):
         Runner(plan(walker, {"RHip_rz": (0.0, 1.0)}, measures=("distanz",)))

@@ -120,9 +120,9 @@ def test_what_does_not_go_together_is_said():
         choose_samples([free])
     with pytest.raises(SettingError, match="12 points"):
         choose_samples(THREE, "grid", 5)
-    with pytest.raises(SettingError, match="leave out one of the two, or name the --sampler"):
+    with pytest.raises(SettingError, match="leave out one of the two, or select a --sampler"):
         choose_samples(THREE, None, 5)
     assert choose_samples(THREE, "lhs", 5).count == 5
-    with pytest.raises(SettingError, match="above zero"):
+    with pytest.raises(SettingError, match="at least 1"):
         choose_samples([free], "random", 0)
     assert choose_samples([Variable("slope", Slope(), 0.1, 0.1, 1)]).count == 1

@@ -66,7 +66,7 @@ def test_controls():
         resolve_variables({"motor": "0:1"}, model, build_mechanism(model), {})
     with pytest.raises(SettingError, match="did you mean 'motor/control'"):
         resolve_variables({"moter/control": "0:1"}, model, build_mechanism(model))
-    with pytest.raises(SettingError, match="are the same number; vary one of them"):
+    with pytest.raises(SettingError, match="are the same quantity; vary one of them"):
         resolve_variables(
             {"motor/control": "0:1", "/forceset/motor/control": "0:1"},
             model,
@@ -151,14 +151,14 @@ def test_a_path_without_its_slash_is_told():
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ("1:0", "turn it round"),
-        ("0:1:0", "above zero"),
-        ("0:1:x", "above zero"),
+        ("1:0", "write the lower end first"),
+        ("0:1:0", "at least 1"),
+        ("0:1:x", "at least 1"),
         ("0:1:2:3", "takes LOW:HIGH"),
         ("a:1", "not a number"),
         ("0:inf", "not a number"),
-        ("0:1:log", "above zero"),
-        ("1:1:5", "give it one"),
+        ("0:1:log", "above 0"),
+        ("1:1:5", "give one value"),
         ("0:1:1", "one value only"),
         ((0.0, math.nan), "not a number"),
     ],
@@ -178,11 +178,11 @@ def test_words_of_the_command_line():
 
 
 def test_the_same_number_is_not_varied_twice():
-    with pytest.raises(SettingError, match="same number"):
+    with pytest.raises(SettingError, match="same quantity"):
         resolve_variables(
             {"/bodyset/*/mass": "1:2", "/bodyset/Pelvis/mass": "1:2"}, MODEL, MECHANISM
         )
-    with pytest.raises(SettingError, match="same number"):
+    with pytest.raises(SettingError, match="same quantity"):
         resolve_variables({"RHip_rz": "1:2", HIP: "1:2"}, MODEL, MECHANISM)
     with pytest.raises(SettingError, match="locked"):
         one("platform_rz/speed")

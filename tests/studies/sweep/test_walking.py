@@ -144,7 +144,7 @@ def test_feet_may_be_given(walker):
 
 def test_who_cannot_be_planted_is_told_before_any_run(walker):
     pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
-    with pytest.raises(SettingError, match="planted with --engine compiled only"):
+    with pytest.raises(SettingError, match="--planted needs --engine compiled"):
         Runner(plan(walker, VARY, engine="bullet", is_planted=True))
     walker.tree().by_path["/forceset/LFootForce"].appliesForce = False
     walker.tree().by_path["/forceset/LKneeForce"].appliesForce = False
