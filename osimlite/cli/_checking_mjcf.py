@@ -30,11 +30,14 @@ def print_mjcf_check(file: Path, mjcf: Path, output: Path | None) -> None:
         say(f"the file lacks {join_words(list(result.missing), max_count=6)}")
     if result.coordinates:
         say(
-            f"the file has no joint for {join_words(list(result.coordinates), max_count=6)}, which does not move in the "
+            f"the file has no joint for {join_words(list(result.coordinates), max_count=6)}; these "
+            "coordinates do not move in the "
             "comparison"
         )
     if result.bodies is not None:
-        say(f"origins of bodies are off by {1e3 * result.bodies.rms:.2g} mm (root mean square)")
+        say(
+            f"origins of bodies differ from the model's by {1e3 * result.bodies.rms:.2g} mm (root mean square)"
+        )
     if output is not None:
         make_folder(output)
         write_atomically(output / "check.json", result.to_json())

@@ -89,12 +89,13 @@ class Request:
         source_format = find_format(file) if source is None else source
         if source_format is None and is_table(str(file)):
             raise SettingError(
-                f"'{file.name}' is already a table of OpenSim, which 'convert' does not convert; to convert it together "
+                f"'{file.name}' is a table of OpenSim, and 'convert' does not convert tables alone; to "
+                "convert the table together "
                 "with its model, name the model first and add --motion"
             )
         if source_format is None:
             raise SettingError(
-                f"the format of '{file.name}' is not one that 'convert' recognizes; name it with --from: "
+                f"'convert' does not recognize the format of '{file.name}'; name the format with --from: "
                 f"{', '.join(sorted(sources))}"
             )
         targets = {OSIM, MARKERS, PROJECT, *(exporter.name for exporter in EXPORTERS)}
@@ -197,7 +198,9 @@ class Request:
                     f"leave out {option}"
                 )
         if motion is not None and (exporter is None or not exporter.takes_motion):
-            raise SettingError(f"the format '{self.target}' has no motion; leave out --motion")
+            raise SettingError(
+                f"the format '{self.target}' cannot contain a motion; leave out --motion"
+            )
         values = {
             converter.name: {
                 option.name: option_values[option.name]
@@ -337,7 +340,7 @@ class Request:
             fidelity.add(
                 "force",
                 force.path,
-                "what a force does",
+                "a force or muscle",
                 f"{LEFT_OUT}; its path is drawn if it has one",
             )
         for remark in model_view.remarks:

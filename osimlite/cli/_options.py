@@ -37,7 +37,9 @@ Start = Annotated[
 ]
 StartSpeed = Annotated[
     list[str] | None,
-    Option("--set-speed", metavar="NAME=VALUE", help="Initial speed of a coordinate (per second)."),
+    Option(
+        "--set-speed", metavar="NAME=VALUE", help="Initial speed of a coordinate (rad/s or m/s)."
+    ),
 ]
 To = Annotated[float, Option("--to", metavar="SECONDS", help="Duration of the simulation.")]
 Engine = Annotated[
@@ -90,9 +92,9 @@ AppliedTo = Annotated[
     Option(
         "--applied-to",
         metavar="BODY=FORCE,POINT,MOMENT",
-        help="Columns of the table in --external-loads that act on a body: the prefixes of the labels of force, point "
-        "and moment, such as f1_,p1_,m1_ for the first plate of a .c3d. Point and moment are optional. Join several "
-        "loads with +.",
+        help="The columns of the table in --external-loads that contain the load on a body: the prefixes of the labels of "
+        "force, point and moment, such as f1_,p1_,m1_ for the first plate of a .c3d. Point and moment are optional. Join "
+        "several loads with +.",
         show_default=False,
     ),
 ]
@@ -100,7 +102,7 @@ Foot = Annotated[
     list[str] | None,
     Option(
         metavar="CONTACT",
-        help="Contact forces of a foot, joined by +; once per foot.",
+        help="Contact forces of one foot, joined by +. Repeat it for the other foot.",
         show_default="the ends of the legs",
     ),
 ]
@@ -190,7 +192,7 @@ Plot = Annotated[
     bool,
     Option(
         "--plot",
-        help="Draw the results as PNG: left and right in one panel, at most 12 panels a page.",
+        help="Draw the results as PNG: curves of the left and the right side in one panel, at most 12 panels a page.",
     ),
 ]
 Band = Annotated[
@@ -198,8 +200,8 @@ Band = Annotated[
     Option(
         "--band",
         metavar="FILE.csv",
-        help="With --plot: draw mean and standard deviation over the gait cycle behind the curves; columns are per "
-        "cent, NAME_mean and NAME_sd.",
+        help="With --plot: draw the mean and standard deviation in this file behind the curves. Its columns are per "
+        "cent (of the gait cycle), NAME_mean and NAME_sd.",
         show_default=False,
     ),
 ]

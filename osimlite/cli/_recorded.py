@@ -121,7 +121,7 @@ def require_plots(*, plot: bool, band: Path | None = None) -> None:
         from osimlite.view.bands import read_bands
 
         if not plot:
-            raise SettingError("--band is drawn into the pictures of --plot; add --plot")
+            raise SettingError("--band has no effect without --plot; add --plot")
         read_bands(band)
     if plot:
         from osimlite.base.require import require

@@ -27,7 +27,7 @@ ReportInterval = Annotated[
     float | None,
     Option(
         metavar="SECONDS",
-        help="Time between the states that a function or an expression uses.",
+        help="Time between the states that functions and expressions of measures use.",
         show_default="0.01 for expressions",
     ),
 ]
@@ -131,7 +131,7 @@ def make_plan(
     ranges = parse_ranges(vary or [])
     # A controller has parameters that vary by default.
     if not ranges and settings.get("controller") is None:
-        raise SettingError("say what to vary, as in --vary RHip_rz=0.2:0.6")
+        raise SettingError("name the quantities to vary, for example --vary RHip_rz=0.2:0.6")
     levels = {
         "below": _parse_levels(below, "--stop-below"),
         "above": _parse_levels(above, "--stop-above"),
@@ -170,7 +170,9 @@ def _make_plan(
     # A value for a parameter that also varies would be overwritten in each run.
     doubly_set = [name for name in ranges if name in set_values]
     if doubly_set:
-        raise SettingError(f"the parameter '{doubly_set[0]}' is set and varied; do one of the two")
+        raise SettingError(
+            f"the parameter '{doubly_set[0]}' is set by -p and varied by --vary; leave out one of the two"
+        )
     varied_defaults = {
         name: default for name, default in list_parameters(source).items() if name not in set_values
     }

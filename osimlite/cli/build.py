@@ -70,7 +70,7 @@ def build(
     target = output or Path(f"{model.name or 'model'}.osim")
     if target.suffix == ".omoco":
         raise OsimliteError(
-            f"{target}: this is the name of a study; name the model's file, {target.stem}.osim"
+            f"{target}: this name is reserved for the Moco study of the model; name the model's file, {target.stem}.osim"
         )
     make_folder_of(target)
     write(model, target, numbers=style)

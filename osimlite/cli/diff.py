@@ -23,13 +23,12 @@ def diff(
 ) -> None:
     """Show the differences between two models or setups: component, property, old and new value.
 
-    Layout, order, comments, number formats and defaults that are written out do not count. For two
+    Ignores layout, order, comments, number formats, and defaults that only one file contains. For two
     tables (.sto, .mot) it lists added and removed columns, and the largest difference in each of the
     others. Exits with 1 if the files differ.
 
     To use it as git's diff for model files: git config diff.osim.command 'osimlite diff --git', and
-    add to .gitattributes the
-    line: *.osim diff=osim
+    add to .gitattributes the line: *.osim diff=osim
 
     Example: osimlite diff gait2392.osim gait2392_scaled.osim
     """

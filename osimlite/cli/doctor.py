@@ -46,7 +46,7 @@ NEEDS: dict[str, tuple[str, ...]] = {
     "run": ("numpy",),
     "view": ("numpy",),
     "gait": ("numpy",),
-    "kernels without a library or a C++ compiler": ("numba",),
+    "compiling kernels without a C++ compiler": ("numba",),
     "simulate --engine bullet": ("numpy", "pybullet"),
     "simulate --gui": ("numpy", "pybullet"),
     "simulate --plot": ("numpy", "matplotlib"),
@@ -292,7 +292,7 @@ def examine_package(name: str) -> Package:
     if process.returncode == 0:
         return Package(name, version, "")
     error_lines = errors.decode(errors="replace").strip().splitlines() or [
-        f"its process ended with {process.returncode}"
+        f"its process ended with exit code {process.returncode}"
     ]
     return Package(name, version, error_lines[-1])
 

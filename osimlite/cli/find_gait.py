@@ -22,9 +22,11 @@ def find_gait(
         int, Option(min=1, metavar="N", help="Number of random walkers to try.")
     ] = 65536,
     tries: Annotated[
-        int, Option(min=1, metavar="N", help="Number of the best walkers to refine to cycles.")
+        int, Option(min=1, metavar="N", help="Number of best walkers to refine to gait cycles.")
     ] = 40,
-    enough: Annotated[int, Option(min=1, metavar="N", help="Stop after N cycles.")] = 5,
+    enough: Annotated[
+        int, Option(min=1, metavar="N", help="Stop the search when N gait cycles are found.")
+    ] = 5,
     budget: Annotated[
         int,
         Option(min=0, metavar="N", help="Parameter sets to try when the stability is optimized."),
@@ -32,14 +34,15 @@ def find_gait(
     stable: Annotated[
         float,
         Option(
-            help="Optimize the stability until the largest multiplier is below this, then the basin."
+            help="Optimize the stability until the largest Floquet multiplier is below this number. "
+            "Then optimize the share of walkers that keep walking after a perturbation."
         ),
     ] = 0.6,
     perturb: Annotated[
         float,
         Option(
             metavar="PART",
-            help="Distance of initial states from the cycle for the basin: 0.1 is 10 %.",
+            help="Largest relative change of the initial values and speeds of perturbed walkers: 0.1 is 10 %.",
         ),
     ] = 0.1,
     digits: Annotated[

@@ -30,10 +30,18 @@ def fit(
     ] = None,
     weight: options.Weights = None,
     by_axis: Annotated[
-        bool, Option("--by-axis", help="Scale each body differently along its axes.")
+        bool,
+        Option(
+            "--by-axis",
+            help="Scale each body by three factors, one for each axis, instead of one factor.",
+        ),
     ] = False,
     sides: Annotated[
-        bool, Option("--each-side", help="Scale the left and the right side differently.")
+        bool,
+        Option(
+            "--each-side",
+            help="Scale the bodies of the left and the right side by different factors.",
+        ),
     ] = False,
     frames: Annotated[
         int, Option("--frames", metavar="COUNT", help="Number of frames to use, over all trials.")

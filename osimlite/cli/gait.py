@@ -36,9 +36,14 @@ def gait(
         float, Option("--to", metavar="SECONDS", help="Maximum duration of the walk.")
     ] = 60.0,
     settle: Annotated[
-        int, Option(min=0, metavar="N", help="Steps before the search for the cycle.")
+        int,
+        Option(
+            min=0, metavar="N", help="Number of steps to walk before the search for the gait cycle."
+        ),
     ] = 0,
-    accuracy: Annotated[float, Option(help="Integrator accuracy in the step map.")] = 1e-10,
+    accuracy: Annotated[
+        float, Option(help="Integrator accuracy in the computation of the gait cycle.")
+    ] = 1e-10,
     perturb: Annotated[
         list[float] | None,
         Option(
@@ -52,7 +57,12 @@ def gait(
     ] = 60,
     seed: Annotated[int, Option(help="Seed of the random initial states.")] = 0,
     steps: Annotated[
-        int, Option(min=1, metavar="N", help="Number of steps that counts as walking.")
+        int,
+        Option(
+            min=1,
+            metavar="N",
+            help="A random or grid start counts as walking after this number of steps.",
+        ),
     ] = 20,
     basin: Annotated[
         bool,
@@ -66,10 +76,14 @@ def gait(
     ] = "",
     basin_y: Annotated[str, Option(metavar="NAME", help="Variable of the rows.")] = "",
     reach: Annotated[
-        float, Option(help="Size of the grid around the cycle (rad, m, or per second).")
+        float, Option(help="Half the width of the grid around the cycle (rad, m, rad/s or m/s).")
     ] = 0.5,
-    grid: Annotated[int, Option(min=2, metavar="N", help="Number of rows and columns.")] = 21,
-    pictures: Annotated[bool, Option(help="Draw the basin.")] = True,
+    grid: Annotated[
+        int, Option(min=2, metavar="N", help="Number of rows and of columns of the grid.")
+    ] = 21,
+    pictures: Annotated[
+        bool, Option(help="Draw the basin (the initial states from which the model walks) as PNG.")
+    ] = True,
     output: Annotated[
         Path | None,
         Option(
@@ -86,11 +100,12 @@ def gait(
 ) -> None:
     """Count the steps of a walker, compute its gait cycle, and report whether the cycle is stable.
 
-    The walk begins at the model's default values and speeds. A step is a touch-down of the other
-    foot, at least 5 cm ahead along the slope and after at least 0.05 s in the air. Any other
-    touch-down is a scuff. The walk ends when any part other than a foot touches the ground.
+    The walk begins at the model's default values and speeds, or at those of --set and --set-speed.
+    A step is a touch-down of the other foot, at least 5 cm ahead along the slope and after at least
+    0.05 s in the air. Any other touch-down is a scuff. The walk ends when any part other than a foot
+    touches the ground.
 
-    Exits with 1 if there is no cycle.
+    Exits with 1 if no gait cycle is found.
 
     Example: osimlite gait steady-walker --perturb 0.05 --basin -o gait
     """
@@ -298,7 +313,7 @@ def _describe_cycle(result: GaitReport, files: Sequence[Path]) -> FactTable:
         # Large eigenvalues decide about stability; of high-dimensional models only the first six
         # are shown.
         sizes = ", ".join(f"{size:.3g}" for size in abs(cycle.multipliers[:6]))
-        facts.add("multipliers", f"{sizes} ...; {cycle.neutral} neutral directions left out")
+        facts.add("multipliers", f"{sizes} ...; without {cycle.neutral} neutral directions")
         facts.add(
             "fixed point",
             f"residual {cycle.residual:.2g} after {format_count(cycle.iterations, 'Newton step')}",

@@ -37,7 +37,7 @@ def ik(
 ) -> None:
     """Compute the motion that fits measured markers: writes ik.mot and marker_errors.sto.
 
-    Each frame is the pose with the smallest weighted mean of squared distances, solved exactly.
+    The pose of each frame minimizes the weighted mean of the squared distances between measured and model markers.
     Locked coordinates keep their defaults, clamped ones stay in their ranges. ik.mot is in degrees,
     like OpenSim's; marker_errors.sto has the distance of each marker from its measured position (m).
     If TRIAL has orientations of sensors (quaternions), the angles between measured and model

@@ -17,7 +17,7 @@ def inverse_dynamics(
         list[str] | None,
         Option(
             metavar="NAME",
-            help="Forces to leave out: a force, a group, All, Actuators or Muscles (default: Muscles).",
+            help="Forces to leave out: the name of a force or of a group, or All, Actuators or Muscles (default: Muscles).",
             show_default=False,
         ),
     ] = None,

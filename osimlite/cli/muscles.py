@@ -91,7 +91,7 @@ def muscles(
     if len(coordinate or ()) > 2:
         raise SettingError("--coordinate can be given once or twice")
     if plot and not coordinate:
-        raise SettingError("--plot needs a --coordinate to draw over")
+        raise SettingError("--plot needs a --coordinate for the horizontal axis; add one")
     require_plots(plot=plot)
     model = read(file)
     mechanism = build_mechanism(model)

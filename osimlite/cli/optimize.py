@@ -59,14 +59,14 @@ def optimize(
     ] = None,
     sigma: Annotated[
         float,
-        Option(help="Initial standard deviation / range."),
+        Option(help="Initial standard deviation, as a fraction of each range."),
     ] = 0.25,
     seed: Annotated[int, Option(help="Seed of the random numbers.")] = 0,
     start: Annotated[
         Path | None,
         Option(
             metavar="FOLDER",
-            help="Start from another search.",
+            help="Start at the best result of another search.",
             show_default="the model",
         ),
     ] = None,
@@ -77,7 +77,11 @@ def optimize(
         ),
     ] = None,
     unbounded: Annotated[
-        bool, Option("--unbounded", help="Use the ranges at the start only, not as bounds.")
+        bool,
+        Option(
+            "--unbounded",
+            help="Let the search leave the ranges of --vary.",
+        ),
     ] = False,
     tolerance: Annotated[
         float | None,
@@ -88,7 +92,7 @@ def optimize(
         Option(
             "--measure",
             metavar="NAME",
-            help="Another measure for the history.",
+            help="Write this measure into the history, too.",
             show_default=False,
         ),
     ] = None,

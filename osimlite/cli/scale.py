@@ -35,7 +35,7 @@ def scale(
     ] = None,
     mass: options.Mass = -1.0,
     preserve: Annotated[
-        bool, Option("--preserve-masses", help="Preserve the mass distribution of the bodies.")
+        bool, Option("--preserve-masses", help="Keep each body's share of the total mass.")
     ] = False,
     place: Annotated[
         bool, Option("--place", help="Move the model's markers to their measured positions.")

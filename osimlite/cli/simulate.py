@@ -32,7 +32,7 @@ def simulate(
         Path | None,
         Option(
             metavar="FILE",
-            help="Start from the last row of a file of states; --set overrides it.",
+            help="Start from the last row of a file of states; values of --set replace those in the row.",
             show_default=False,
         ),
     ] = None,
@@ -40,7 +40,10 @@ def simulate(
     par: options.Par = None,
     output: options.Folder = None,
     plot: Annotated[
-        bool, Option("--plot", help="Draw coordinates, muscles, forces, probes and energy as PNG.")
+        bool,
+        Option(
+            "--plot", help="Draw coordinates, muscles, forces, probes and energy over time as PNG."
+        ),
     ] = False,
     animate: Annotated[
         bool, Option("--animate", help="Write the motion as animation.gif.")

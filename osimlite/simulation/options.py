@@ -239,11 +239,11 @@ class Options(IntegrationOptions):
         "of the length. If a wrap prescribes a side (quadrant), the curve is a geodesic, but may not be the shortest.",
     )
     skip_unsupported: bool = define_option(
-        False, "Leave out unsupported forces.", more="The summary lists them."
+        False, "Leave out forces that osimlite cannot compute.", more="The summary lists them."
     )
     opensim_derivatives: bool = define_option(
         False,
-        "Repeat OpenSim's errors in joints that rotate about several axes.",
+        "Repeat OpenSim's errors in the equations of joints that rotate about several axes.",
         more="OpenSim computes two second derivatives incorrectly there; see "
         ":func:`osimlite.mechanics.multibody.build_mechanism`.",
     )

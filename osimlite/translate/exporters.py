@@ -108,7 +108,7 @@ URDF_CHOICES = (
     OptionSpec(
         "limits",
         str | None,
-        "'range' writes coordinate ranges as hard limits, which they are not in OpenSim.",
+        "'range' writes coordinate ranges as hard limits; in OpenSim, ranges do not limit motions.",
         default_text="none",
         group="URDF",
     ),
@@ -150,14 +150,14 @@ MJCF_CHOICES = (
     OptionSpec(
         "contact",
         str | None,
-        "'native' writes contact forces as contacts of MuJoCo's own law, 'none' leaves them out.",
+        "'native' writes contacts, whose forces follow MuJoCo's own law; 'none' leaves contacts out.",
         default_text="native",
         group="MJCF",
     ),
     OptionSpec(
         "fit",
         str | None,
-        "'wraps' fits wrap surfaces to OpenSim's paths, 'force' muscles too (up to a minute).",
+        "'wraps' fits wrap surfaces to OpenSim's paths; 'force' also muscle forces (up to a minute).",
         default_text="none",
         group="MJCF",
     ),
@@ -192,8 +192,8 @@ EXPORTERS: list[Exporter] = [
     Exporter(
         "urdf",
         "translate",
-        "<file>.urdf, and <file>.coordinates.json, which says how coordinates drive joints where "
-        "URDF cannot",
+        "<file>.urdf, and <file>.coordinates.json, which describes how coordinates move joints if "
+        "URDF cannot express this",
         write_urdf,
         URDF_CHOICES,
         is_default=True,
@@ -269,7 +269,7 @@ EXPORTERS: list[Exporter] = [
             OptionSpec(
                 "at",
                 float | None,
-                "The moment of the screenshot.",
+                "Time of the picture.",
                 unit="SECONDS",
                 default_text="the first",
             ),

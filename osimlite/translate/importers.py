@@ -88,15 +88,15 @@ MJCF_CHOICES = (
         "written_for",
         # Text, so that a wrong value gets a message with the right ones.
         str | None,
-        "The version of MuJoCo that the file was written for: 2, 3 or 4. It decides what a side site "
-        "of a tendon means, and is required where that makes a difference.",
+        "The version of MuJoCo that the file was written for: 2, 3 or 4. Required if a side site "
+        "of a tendon means something else in another version.",
         unit="VERSION",
         group="From MJCF",
     ),
     OptionSpec(
         "muscle_class",
         str | None,
-        "'millard' makes muscles with fitted curves, 'exact' RigidTendonMuscles with MuJoCo's "
+        "'millard' makes Millard muscles with fitted curves, 'exact' makes RigidTendonMuscles with MuJoCo's "
         "curves and without activation dynamics.",
         default_text="millard",
         group="From MJCF",
@@ -118,8 +118,8 @@ MJCF_CHOICES = (
     OptionSpec(
         "contacts",
         str | None,
-        "'forces' makes contact surfaces and Hunt-Crossley forces, 'geometry' surfaces only, 'none' "
-        "nothing.",
+        "'forces' makes contact surfaces and Hunt-Crossley forces, 'geometry' only surfaces, 'none' "
+        "neither.",
         default_text="forces",
         group="From MJCF",
     ),

@@ -36,7 +36,7 @@ def file(tmp_path: Path) -> str:
         (["-o", __file__], "this is a file, not a folder"),
         (["--basin-x", "UNKNOWN"], "UNKNOWN"),
         (["--basin-y", "RHip_rz/sped"], "RHip_rz/sped"),
-        (["--basin-x", "RHip_rz", "--basin-y", "RHip_rz"], "are the same number"),
+        (["--basin-x", "RHip_rz", "--basin-y", "RHip_rz"], "are the same variable"),
     ],
 )
 def test_options_are_checked_before_the_walk(
@@ -110,5 +110,6 @@ def test_constraints_are_beyond_the_search_for_gaits(
     assert run(file) == 1
     error = capsys.readouterr().err
     assert (
-        "some of which /constraintset/held takes away" in error and "take the engine" not in error
+        "constraints or prescribed coordinates: /constraintset/held" in error
+        and "take the engine" not in error
     )

@@ -94,8 +94,8 @@ def test_a_filter_takes_the_noise_away(fixtures: Path, tmp_path: Path) -> None:
     )
     assert abs(smooth[10:-10]).max() < 0.1 * abs(plain[10:-10]).max()
     for given, said in (
-        ("0", "a low-pass frequency is a positive number of Hz, not 0"),
-        ("nan", "a low-pass frequency is a positive number of Hz, not nan"),
+        ("0", "a low-pass frequency must be a positive number of Hz, not 0"),
+        ("nan", "a low-pass frequency must be a positive number of Hz, not nan"),
         ("1e-300", None),
         ("32", "32 Hz is too high for samples every 0.015625 s; take less than 32 Hz"),
         ("1e308", "is too high for samples every 0.015625 s"),
@@ -199,13 +199,13 @@ def test_loads_without_a_document(fixtures: Path, tmp_path: Path) -> None:
         (("--external-loads", "push.sto", "--applied-to", "Pelvic=f_"), "did you mean 'Pelvis'?"),
         (
             ("--external-loads", "push.sto", "--applied-to", "Pelvis=g_"),
-            "no column of 'push.sto' begins with it",
+            "no column label of 'push.sto' begins with this text",
         ),
         (
             ("--external-loads", "push.sto", "--applied-to", "Pelvis"),
             "--applied-to takes BODY=FORCE,POINT,MOMENT",
         ),
-        (("--from", "3"), "no time of the motion lies after 3 s"),
+        (("--from", "3"), "the motion has no row after 3 s"),
     ]
     for more, said in wrong:
         done = run("inverse-dynamics", walker, "still.mot", *more, folder=tmp_path)

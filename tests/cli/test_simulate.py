@@ -334,8 +334,10 @@ def test_what_is_doubtful_is_told_and_done(driven):
     code, _, err = run(
         "simulate", driven.name, "--to", "0.5", "--controls", "controls.sto", folder=driven.parent
     )
-    told = "osimlite: the controls are given from 0 to 0.2 s of a motion from 0 to 0.5 s; "
-    assert (code, err) == (0, told + "their first and last values hold before and after\n")
+    told = (
+        "osimlite: the controls cover only 0 to 0.2 s of the motion, which goes from 0 to 0.5 s; "
+    )
+    assert (code, err) == (0, told + "outside, the first and last values are used\n")
     assert read_sto(driven.parent / "driven" / "forces.sto")["a"][-1] == 3.0
 
 

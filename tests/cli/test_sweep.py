@@ -118,7 +118,7 @@ def test_a_search(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["sweep", "walker.osim"], "say what to vary"),
+        (["sweep", "walker.osim"], "name the quantities to vary"),
         (["sweep", "walker.osim", "--vary", "RHip_rz"], "--vary takes"),
         (
             ["sweep", "walker.osim", "--vary", "RHip_rz=0:1:3", "-o", "b.csv"],

@@ -65,7 +65,10 @@ def test_coordinates_can_be_set(walker: Path) -> None:
         (("walker.osim", "nowhere.sto", "--html", "a.html"), "nowhere.sto"),
         (("walker.osim", "--geometry", "nowhere"), "--geometry names a folder"),
         (("walker.osim", "--set", "RKnee=1", "--html", "a.html"), "RKnee_rz"),
-        (("walker.osim", "--at", "1", "--screenshot", "a.png"), "a time needs a motion"),
+        (
+            ("walker.osim", "--at", "1", "--screenshot", "a.png"),
+            "a time was given without a motion",
+        ),
     ],
 )
 def test_what_cannot_be_shown_is_said(
