@@ -133,8 +133,8 @@ def equilibrate_rows(
         outcome.add_message(
             "no equilibrium",
             f"{reasons[path]}. This concerns {np.count_nonzero(missing)} of {len(times)} times, "
-            f"{_describe_spans(times, missing)}; values that depend on its fibers or its force are "
-            "NaN there",
+            f"{_describe_spans(times, missing)}. Values that depend on the fibers or the force of this muscle are "
+            "NaN at these times",
         )
     outcome.summary["without_equilibrium"] = {
         path: times[missing].tolist() for path, missing in unbalanced.items()

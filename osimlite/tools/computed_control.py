@@ -349,7 +349,7 @@ class ComputedControl:
             result.failure = (
                 f"the actuators cannot produce the accelerations that the tasks need at {t:g} s; "
                 f"missing: {missing_accelerations} "
-                "(rad/s², m/s²). Append reserve actuators, widen the bounds of controls, or lower "
+                "(rad/s², m/s²). Append reserve actuators, widen the bounds of the controls, or lower "
                 "the weights"
             )
             return lower

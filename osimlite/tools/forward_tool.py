@@ -49,14 +49,14 @@ def run_forward_tool(job: Job, outcome: Outcome) -> None:
         start, y = _compute_start(job, outcome, simulation)
         if not start < setup.final_time:
             raise job.create_error(
-                f"the final_time {setup.final_time:g} s does not come after the start at {start:g} "
-                "s"
+                f"the final_time, {setup.final_time:g} s, is not after the start, {start:g} s; "
+                "set a later final_time"
             )
         # Every step is recorded, so that their number bounds the memory.
         if setup.final_time - start > MAX_FIXED_STEPS * bounds[1]:
             raise job.create_error(
-                f"the final_time {setup.final_time:g} s is too far away for steps of {bounds[1]:g} "
-                "s"
+                f"too many steps of {bounds[1]:g} s are needed until the final_time, {setup.final_time:g} s; "
+                "set an earlier final_time or a larger maximum_integrator_step_size"
             )
         settings = EngineSettings(accuracy=setup.integrator_error_tolerance, step_bounds=bounds)
         times, states, failure = simulation.record_every_step(start, y, setup.final_time, settings)
@@ -96,7 +96,7 @@ def _compute_start(job: Job, outcome: Outcome, simulation: Simulation) -> tuple[
         if start != setup.initial_time:
             outcome.add_message(
                 "start",
-                f"{start:g} s, because the states_file has its last row up to initial_time there",
+                f"{start:g} s, the time of the last row in the states_file that is not after initial_time",
             )
     if setup.solve_for_equilibrium_for_auxiliary_states:
         y = simulation.engine.equilibrate_muscles(start, y)

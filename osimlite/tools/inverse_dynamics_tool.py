@@ -48,8 +48,8 @@ def run_inverse_dynamics_tool(job: Job, outcome: Outcome) -> None:
     if by_path:
         outcome.add_warning(
             "columns",
-            f"'{setup.coordinates_file}' names {join_words(by_path)} by paths, which osimlite "
-            "reads; OpenSim's "
+            f"'{setup.coordinates_file}' names {join_words(by_path)} by paths. osimlite "
+            "reads these columns. OpenSim's "
             "inverse dynamics uses the default values of these coordinates instead, so its moments "
             "differ",
         )
@@ -64,7 +64,9 @@ def run_inverse_dynamics_tool(job: Job, outcome: Outcome) -> None:
             exclude_forces(model, [name])
         except SettingError as error:
             # As in OpenSim, an unknown name excludes nothing.
-            outcome.add_message("forces to exclude", f"{error.message}; nothing is excluded for it")
+            outcome.add_message(
+                "forces to exclude", f"{error.message}; the name is ignored, as in OpenSim"
+            )
     loads = job.find_path("external_loads_file")
     forces = force_elements(model, recorded.mechanism, external_loads=loads, folder=None)
     table = recorded.inverse_dynamics(forces)

@@ -95,7 +95,7 @@ def find_setups(names_or_patterns: Iterable[str | Path]) -> list[Path]:
             ]
             if not setups:
                 raise OsimliteError(
-                    f"no setup matches '{name_or_pattern}': it matches models, sets and tables only; name setup "
+                    f"the files that match '{name_or_pattern}' are models, sets and tables; name setup "
                     "files"
                     if matches
                     else f"no file matches '{name_or_pattern}'; correct the pattern, or change to the folder "
@@ -416,7 +416,9 @@ class _Schedule:
                     if self.trials[Path(need)].status in (FAILED, WAITED)
                 ]
                 if failed_needs:
-                    message = f"it needs results of {join_words(failed_needs)}, which failed"
+                    message = (
+                        f"this setup needs results of {join_words(failed_needs)}, which failed"
+                    )
                     self.record_run(RunRecord(str(setup), WAITED, failure=message))
                 elif (trial := self.journal.find_finished(setup)) is not None:
                     self.record_run(trial)
@@ -473,7 +475,11 @@ class _Schedule:
                         self.record_run(pool.result()[1])
                 except WorkerLostError:
                     self.record_run(
-                        RunRecord(str(setup), FAILED, failure="the process that ran it died twice")
+                        RunRecord(
+                            str(setup),
+                            FAILED,
+                            failure="the process that ran this setup crashed twice",
+                        )
                     )
 
 

@@ -193,7 +193,7 @@ class Outcome:
             if path.name in self.tables or path.suffix.lower() != ".osim"
         ]
         for path in find_inputs(protected_paths, setup):
-            message = f"a result would replace '{path}', from which it is computed; give it another name or folder"
+            message = f"a result would replace '{path}', an input of this setup; give the result another name or folder"
             raise DocumentError(message, file=str(setup))
 
     def write(self, setup: Path, writer: ResultWriter) -> None:

@@ -94,7 +94,7 @@ class _FileSearch:
         self.left -= len(result)
         if self.left < 0:
             raise OsimliteError(
-                f"the search for '{self.pattern}' reads more than {MAX_ENTRIES} files; name the "
-                "folders"
+                f"the search for '{self.pattern}' visits more than {MAX_ENTRIES} files; write the names of the "
+                "folders into the pattern"
             )
         return result

@@ -166,7 +166,7 @@ def _render_verdicts(outcomes: Mapping[str | Path, Outcome]) -> Iterator[str]:
         f'<p class="note">Not checked:</p><ul class="note">{unchecked}</ul>' if unchecked else ""
     )
     yield (
-        '<h2>Is it good enough?</h2><p class="note">The worst value of each kind. Good: within '
+        '<h2>Is it good enough?</h2><p class="note">The worst value of each quantity. Good: within '
         "every published limit; okay: "
         "within the looser of two limits only; bad: beyond "
         "all. Limits: up to the first number a value is good, up to the second it is okay.</p>"
@@ -211,7 +211,7 @@ def _render_viewer(evidence: Evidence, states: Mapping[str, Array]) -> str:
     # A report shows no findings about the model.
     data = page_data(viewer.model, viewer.scene, viewer.motion, (), viewer.q)
     page = page_text(data).replace("</style>", f"{NO_SIDEBAR_STYLE}</style>", 1)
-    note = "Green: as measured; pink: of the model." if measured else ""
+    note = "Green: measured markers; pink: markers of the model." if measured else ""
     return f'<iframe srcdoc="{html.escape(page)}" title="the motion"></iframe><p class="note">{note}</p>'
 
 
@@ -240,9 +240,12 @@ def _render_section(title: str, panels: Mapping[str, list[TrialCurve]]) -> Itera
         panel.set_visible(False)
     _add_legend(figure, lines)
     if cyclic:
-        note = "Over the gait cycle, from each strike of the foot on the same side to the next. Thin: each cycle; thick: mean."
+        note = (
+            "Over the gait cycle, from each strike of the foot on the same side to the next. Thin lines: each "
+            "cycle; thick lines: mean."
+        )
         if any(not line.side for line in lines):
-            note += " Curves without a side follow the right foot."
+            note += " For curves without a side, cycles begin with the right foot."
     else:
         note = "Over time"
         note += (
@@ -332,7 +335,7 @@ def _render_errors(trial: TrialOutcomes, name: str) -> Iterator[str]:
         figure = _draw_errors(
             evidence.times, evidence.sensors, np.degrees(evidence.angles), "sensor", "deg", ()
         )
-        note = "Angles from the measured orientations."
+        note = "Angles between measured and model orientations."
         yield f'<h2>Sensor errors{html.escape(name)}</h2><p class="note">{note}</p>{_render_image(figure)}'
 
 

@@ -144,7 +144,8 @@ def run(
         if current_folder_files:
             outcome.add_message(
                 "current folder",
-                f"contains {join_words(current_folder_files)}, which the folder of the setup lacks",
+                "these files were read in the current folder, because the folder of the setup does not contain them: "
+                f"{join_words(current_folder_files)}",
             )
         outcome.warnings = sorted(
             report.errors + report.warnings, key=lambda finding: finding.suggestion is None
@@ -178,9 +179,7 @@ def run(
             isinstance(subject, Setup)
             and (writing_setup := subject.find_writer(error.file)) is not None
         ):
-            error.message += (
-                f"; run '{get_relative_path(writing_setup, Path.cwd())}' first, which writes it"
-            )
+            error.message += f"; run '{get_relative_path(writing_setup, Path.cwd())}' first, which writes this file"
         raise
     return outcome
 

@@ -165,7 +165,7 @@ def _apply_locks(
                 info.name,
                 f"locked at {info.default_value:g} {unit}, up to {deviation:.3g} {unit} from the "
                 "desired motion; "
-                "as in OpenSim, the lock wins, and a task of this coordinate has no effect",
+                "as in OpenSim, the coordinate stays locked, and a task for it has no effect",
             )
 
 

@@ -112,7 +112,7 @@ def _move_mass_center(
     # Simbody's SignificantReal.
     if weight < 2.0**-45.5:
         outcome.add_message(
-            "mass center", f"'{name}' has no weight, so its mass centre stays, as in OpenSim"
+            "mass center", f"'{name}' has no weight, so its mass centre is not moved, as in OpenSim"
         )
         return
     # The weight W acts along -y, so that a mass centre that moves by (x, 0, z) adds the moments z W
@@ -182,8 +182,8 @@ def run_cmc_tool(job: Job, outcome: Outcome) -> None:
     setup: CMCTool = job.setup
     if setup.actuators_to_exclude:
         raise job.create_unsupported_error(
-            "osimlite does not support actuators_to_exclude, and controls all actuators; leave it "
-            "empty"
+            "osimlite does not support actuators_to_exclude, because it controls all actuators; leave "
+            "the property empty"
         )
     if not setup.cmc_time_window > 0.0:
         raise job.create_error(

@@ -85,7 +85,7 @@ def test_steps_keep_their_bounds(setup: Path) -> None:
     ("old", "new", "said"),
     [
         ("1e-06", "0", "OpenSim does not finish with"),
-        ("<final_time>0.3", "<final_time>0.2", "does not come after the start at 0.2 s"),
+        ("<final_time>0.3", "<final_time>0.2", "is not after the start, 0.2 s"),
         (
             "<integrator_error",
             "<maximum_integrator_step_size>0</maximum_integrator_step_size><integrator_error",

@@ -106,7 +106,7 @@ def test_muscles_that_cannot_be_analysed_are_refused(
     old = next(force for force in model.force_set.objects if isinstance(force, Muscle))
     new = cls(name="new", geometry_path=old.geometry_path.copy_deep(), **more)
     model.add(new)
-    told = "which applies no force" if more else "which osimlite cannot analyse yet"
+    told = "whose appliesForce is false" if more else "which osimlite cannot analyse yet"
     with pytest.raises(NotRunnable, match=f"'M' requests 'new', a {cls.__name__}, {told}"):
         tables(tmp_path, model, '<MuscleAnalysis name="M"/>')
 
@@ -115,6 +115,7 @@ def test_an_actuator_with_several_forces_is_refused(tmp_path: Path) -> None:
     model = jumper()
     model.add(BodyActuator(name="push", socket_body=model.body_set.objects[0]))
     with pytest.raises(
-        NotRunnable, match="'A' needs one force of 'push', a BodyActuator, which has several"
+        NotRunnable,
+        match="'A' needs actuators with one force each, but 'push', a BodyActuator, has several",
     ):
         tables(tmp_path, model, '<Actuation name="A"/>')

@@ -78,10 +78,10 @@ def test_a_file_of_the_current_folder_is_told(setup: Path, monkeypatch: pytest.M
     monkeypatch.chdir(setup.parent)
     assert (
         "current folder",
-        "contains walk.mot, which the folder of the setup lacks",
+        "these files were read in the current folder, because the folder of the setup does not contain them: walk.mot",
     ) in osimlite.run("trial/setup.xml").messages
     done = run("run", "trial/setup.xml", "setup.xml", "-o", "out", folder=setup.parent)
-    assert done.out.count("current folder: contains walk.mot,") == 1
+    assert done.out.count("current folder: these files were read in") == 1
 
 
 def test_the_setup_that_makes_what_is_missing_is_told(setup: Path) -> None:

@@ -178,8 +178,8 @@ def _override_forces(
     if missing_names:
         tables.outcome.add_message(
             analysis.name,
-            f"'{path}' has no column for {join_words(missing_names)}: the forces follow from the states, "
-            "as in OpenSim",
+            f"'{path}' has no column for {join_words(missing_names)}; as in OpenSim, the states determine "
+            "these forces",
         )
         return motion, None
     # The forces of the file replace what controllers would command.
@@ -241,9 +241,8 @@ def write_actuation(analysis: Actuation, motion: Motion, tables: AnalysisTables)
         # The table has one column per actuator.
         if actuator.control_count != 1:
             raise tables.job.create_unsupported_error(
-                f"'{analysis.name}' needs one force of '{actuator.name}', a {type(actuator).__name__}, "
-                "which has several; "
-                "OpenSim crashes on such a model"
+                f"'{analysis.name}' needs actuators with one force each, but '{actuator.name}', a {type(actuator).__name__}, "
+                "has several; OpenSim crashes on such a model"
             )
     tree = motion.model.tree()
     records = motion.read_records(

@@ -47,7 +47,7 @@ def write_muscle_analysis(analysis: MuscleAnalysis, motion: Motion, tables: Anal
     for muscle in muscles:
         # Corrections reproduce OpenSim's numbers; they are known for certain classes only.
         reason = "which osimlite cannot analyse yet" if type(muscle) not in CORRECTIONS else ""
-        reason = reason or ("" if muscle.appliesForce else "which applies no force")
+        reason = reason or ("" if muscle.appliesForce else "whose appliesForce is false")
         if reason:
             raise tables.job.create_unsupported_error(
                 f"'{analysis.name}' requests '{muscle.name}', a {type(muscle).__name__}, {reason}"

@@ -48,7 +48,8 @@ def write_outputs(analysis: OutputReporter, motion: Motion, tables: AnalysisTabl
         match = OUTPUT_PATTERN.fullmatch(requested.strip())
         if match is None:
             raise tables.job.create_error(
-                f"'{analysis.name}' requests '{requested}', which is not an output; write path|output"
+                f"'{analysis.name}' requests '{requested}', which does not name an output; write path|output, "
+                "such as /bodyset/pelvis|position"
             )
         path = "/" + match["path"].strip("/")
         component = tree.walk(path, "", "Component").target if path != "/" else motion.model
@@ -80,7 +81,7 @@ def write_outputs(analysis: OutputReporter, motion: Motion, tables: AnalysisTabl
         type_names = join_words([*OUTPUT_FILES])
         tables.outcome.add_message(
             analysis.name,
-            f"{join_words(left_out)}: left out, as only {type_names} are reported, as in OpenSim",
+            f"{join_words(left_out)}: left out; as in OpenSim, only outputs of the types {type_names} are reported",
         )
     for value_type, name in OUTPUT_FILES.items():
         if columns[value_type]:

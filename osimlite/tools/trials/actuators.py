@@ -158,7 +158,7 @@ def measure_inverse_dynamics(tool: TrialTool, *, is_final: bool) -> Numbers:
     file = tool.find_result(tool.setup.output_gen_force_file)
     if file is None:
         raise MissingInput(
-            f"the forces of {tool} are missing ('{tool.setup.output_gen_force_file}'); run it"
+            f"the forces of {tool} are missing ('{tool.setup.output_gen_force_file}'); run this setup"
         )
     units = {}
     for index in find_root_coordinates(tool.mechanism):
@@ -358,7 +358,7 @@ def measure_activations(folder: TrialFolder, file: Path, muscles: Sequence[str])
             Measurement(
                 "full-activation",
                 "share",
-                "share of the time that any muscle is fully active",
+                "share of the time that a muscle is fully active",
                 0.0,
                 "%",
             ),

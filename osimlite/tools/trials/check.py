@@ -282,7 +282,7 @@ def _plan_tracking(
     claimed.update(file for file in (force, error) if file is not None)
     if force is None:
         missing_error = MissingInput(
-            f"the forces of {tool} are missing ('{tool.setup.name}_Actuation_force.sto'); run it "
+            f"the forces of {tool} are missing ('{tool.setup.name}_Actuation_force.sto'); run this setup "
             "in OpenSim"
         )
         yield "residuals", partial(_raise_missing, missing_error)
@@ -338,7 +338,7 @@ def _plan_static_optimization(
             file = _find_result(tool, f"_{analysis.name}_{ending}.sto")
             if file is None:
                 missing_error = MissingInput(
-                    f"'{tool.setup.name}_{analysis.name}_{ending}.sto' of {tool} is missing; run it"
+                    f"'{tool.setup.name}_{analysis.name}_{ending}.sto' of {tool} is missing; run this setup"
                 )
                 yield (
                     ("residuals and reserves" if ending == "force" else "activations"),

@@ -88,14 +88,16 @@ def measure_marker_errors(tool: TrialTool) -> Numbers:
     name = setup.output_motion_file.strip()
     file = None if name in NO_FILE else folder.find_file(tool.job.get_output_path(name))
     if file is None:
-        raise MissingInput(f"the motion of {tool} is missing ('{name}'); run it")
+        raise MissingInput(f"the motion of {tool} is missing ('{name}'); run this setup")
     try:
         motion = _read_fitted_motion(tool, file)
     # Without the model or the markers, the errors that the tool itself wrote have to do.
     except OsimliteError as error:
         errors = tool.find_result(f"{setup.name}_ik_marker_errors.sto")
         if errors is None:
-            raise MissingInput(f"{error.message}, and there is no file of marker errors") from error
+            raise MissingInput(
+                f"{error.message}; a file of marker errors is missing, too"
+            ) from error
         yield from measure_written_errors(folder, errors)
         return
     summary = motion.summary

@@ -63,7 +63,7 @@ def measure_passive_forces(tool: TrialTool, states: Path | None) -> Numbers:
             Measurement(
                 "passive-force",
                 "peak",
-                "the passive force of any muscle relative to its max_isometric_force",
+                "the passive force of a muscle relative to its max_isometric_force",
                 0.0,
                 "%",
             ),
