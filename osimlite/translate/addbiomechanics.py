@@ -152,7 +152,7 @@ class SubjectFolder:
                 self.fidelity.add(
                     "model",
                     f"/passes/{name}",
-                    "nothing: the file has no model of the pass",
+                    "a processing pass without a model in the file",
                     LEFT_OUT,
                 )
                 continue
@@ -170,7 +170,7 @@ class SubjectFolder:
                 self.fidelity.add(
                     "joint",
                     f"/passes/{name}/model",
-                    "which motion Nimble computes for this model",
+                    "what Nimble computes differently with this model",
                     "the model is used as it is",
                     error.message,
                 )
@@ -258,7 +258,7 @@ class SubjectFolder:
             self.fidelity.add(
                 "pass",
                 trial_path,
-                "coordinates and forces: the trial has no such processing pass",
+                "coordinates and forces of a trial without such a processing pass",
                 LEFT_OUT,
             )
             return paths, facts
@@ -338,7 +338,7 @@ class SubjectFolder:
                 "missing-forces",
                 f"{trial_path}/ground_forces",
                 "that forces of a frame are missing or wrong",
-                f"the forces are written, and the reasons in {MISSING_FILE}; do not trust inverse dynamics there",
+                f"the forces are written, and {MISSING_FILE} has the reasons; do not trust inverse dynamics in these frames",
                 f"{int((reason_codes != 0).sum())} of {trial.frame_count} frames: {summary}",
             )
         file_points = trial.read_arrays(index).get("contact_points")
@@ -358,8 +358,9 @@ class SubjectFolder:
         self.fidelity.add(
             "center-of-pressure",
             f"{trial_path}/ground_forces",
-            "centres of pressure, which the file has as zero in some frames, and with a torque along the force",
-            "computed from the wrench, with a vertical torque; force, point and torque give exactly the wrench",
+            "centres of pressure, which are zero in some frames of the file, and whose torque is parallel to the force",
+            "computed from the measured force and moment, with a vertical torque: force, point and torque "
+            "together are equal to these exactly",
             errors=errors,
         )
 
@@ -375,8 +376,8 @@ class SubjectFolder:
             self.fidelity.add(
                 "derived",
                 f"{trial_path}/derived",
-                "what follows from coordinates, forces and model",
-                f"{LEFT_OUT}; osimlite.read_b3d has it",
+                "quantities that follow from coordinates, forces and model",
+                f"{LEFT_OUT}; osimlite.read_b3d returns them",
                 ", ".join(derived),
             )
         for pass_index, processing_pass in enumerate(trial.passes):

@@ -108,8 +108,8 @@ def to_biomod(
             fidelity.add(
                 "function",
                 f"{joint.source}/{joint.name}",
-                "a motion that follows a function of coordinates",
-                "a degree of freedom of its own; the file of coordinates has the function",
+                "a joint motion that is a function of coordinates",
+                "a separate degree of freedom; the file of coordinates contains the function",
             )
     for constraint in model.components(Constraint):
         fidelity.add("constraint", constraint.path, "constraints", LEFT_OUT)
@@ -321,7 +321,7 @@ def _format_muscles(
             (moving_count, "points that move with a coordinate", "the path runs without them"),
             (
                 conditional_count,
-                "points that count in a range only",
+                "points that act only in a range of a coordinate",
                 "the path always runs through them",
             ),
         ):
@@ -351,7 +351,7 @@ def _format_muscles(
                 "activation",
                 muscle.path,
                 "time constants of the activation",
-                "those of all muscles in biorbd: 0.01 s up, 0.04 s down",
+                "biorbd's time constants for all muscles: activation 0.01 s, deactivation 0.04 s",
                 ", ".join(f"{attribute} {value:g} s" for attribute, value in constants.items()),
             )
         name = names(muscle.name)

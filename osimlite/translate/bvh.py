@@ -88,8 +88,8 @@ def to_bvh(
             fidelity.add(
                 "translation",
                 body.path,
-                "a bone whose joint moves in its parent, which some programs ignore",
-                "position channels: poses are exact where they are read",
+                "a bone whose joint moves relative to its parent bone; some programs ignore this",
+                "position channels: poses are exact in programs that read these channels",
             )
     translated_paths = fidelity.translated.keys()
     # Bodies that are welded to others have no joint.
@@ -139,15 +139,15 @@ class BvhMarkers:
                 self.fidelity.add(
                     "name",
                     f"/{marker}",
-                    "a name with blanks or special characters, or of several joints",
-                    "written with '_', or with a number",
+                    "a name with spaces or special characters, or a name that several joints have",
+                    "written with '_' or with a number at its end",
                     f"'{joint.name}' became '{marker}'",
                 )
         self.fidelity.add(
             "rotation",
             "/",
             "rotations of bones about their own axes",
-            f"{LEFT_OUT}: joint centres do not show them",
+            f"{LEFT_OUT}: positions of joint centres do not contain them",
         )
 
     @property

@@ -85,7 +85,7 @@ def _make_shape(
         case ContactSphere() if geometry.radius > 0.0:
             report(
                 "the material of a contact surface",
-                "a collision shape without it",
+                "a collision shape without the material",
                 f"sphere of {geometry.radius:g} m",
             )
             return Ball(geometry.radius), local_frame
@@ -95,7 +95,7 @@ def _make_shape(
             size = " x ".join(f"{edge:g}" for edge in HALF_SPACE_BOX_M)
             report(
                 "a half space, and its material",
-                f"a collision box of {size} m whose face is its surface",
+                f"a collision box of {size} m, one face of which is the surface",
             )
             return Box(HALF_SPACE_BOX_M), local_frame
         # URDF has no ellipsoids, so that a scaled ball becomes a mesh file.

@@ -99,7 +99,7 @@ def convert_from_nimble(model: Model) -> list[NimbleChange]:
             continue
         if not isinstance(joint, JOINT_CLASSES):
             raise UnsupportedError(
-                f"'{joint.path}': Nimble cannot read a {type(joint).__name__}, so that it is not Nimble's"
+                f"'{joint.path}': Nimble cannot read a {type(joint).__name__}, so this model was not made for Nimble"
             )
         if isinstance(joint, EllipsoidJoint):
             if has_rotated_frames(joint):
@@ -187,7 +187,7 @@ def _rewrite_custom_joint(joint: CustomJoint) -> list[NimbleChange]:
     return [
         NimbleChange(
             joint.path,
-            f"Nimble makes {nimble_joint.value} of this CustomJoint and ignores what that joint does not have",
+            f"Nimble reads this CustomJoint as {nimble_joint.value}, and ignores functions that such a joint does not have",
             f"functions of {join_words(changed_axes)} rewritten",
         )
     ]
@@ -235,7 +235,7 @@ def _build_custom_axes(
             functions.append((axis.function, name))
         else:
             raise UnsupportedError(
-                f"'{joint.path}': an axis has no function, so that Nimble cannot read it"
+                f"'{joint.path}': an axis has no function, so Nimble cannot read the joint"
             )
     result = [
         (vector, *function) for vector, function in zip(vectors[:3], functions[:3], strict=True)
@@ -268,7 +268,7 @@ def _orthogonalize(
     if None not in order:
         if tuple(order) not in AXIS_ORDERS:
             raise UnsupportedError(
-                f"'{joint.path}': Nimble does not know this order of rotation axes"
+                f"'{joint.path}': Nimble does not support this order of rotation axes"
             )
         return list(vectors)
     matrix = np.array(vectors, dtype=float).T
@@ -276,7 +276,7 @@ def _orthogonalize(
     products = [abs(float(matrix[:, i] @ matrix[:, j])) for i, j in ((0, 1), (1, 2), (2, 0))]
     if not may_tilt or max(products) >= MAX_SKEW:
         raise UnsupportedError(
-            f"'{joint.path}': Nimble cannot read rotation axes that are not the axes X, Y and Z in some order"
+            f"'{joint.path}': Nimble cannot read these rotation axes; use the axes X, Y and Z in some order"
         )
     matrix = matrix / np.linalg.norm(matrix, axis=0)
     for _ in range(ORTHOGONALIZATIONS):
@@ -348,7 +348,7 @@ def _extend_splines(joint: CustomJoint) -> list[NimbleChange]:
     return [
         NimbleChange(
             joint.path,
-            "beyond its points a SimmSpline continues as a cubic in Nimble, and as a straight line in OpenSim",
+            "beyond its points, a SimmSpline continues as a cubic in Nimble, but as a straight line in OpenSim",
             f"splines of {join_words(extended_axes)} extended to the range of the coordinate",
         )
     ]
@@ -391,7 +391,7 @@ def _note_bend(joint: ConstantCurvatureJoint) -> list[NimbleChange]:
             return [
                 NimbleChange(
                     joint.path,
-                    f"OpenSim stops the bend of a ConstantCurvatureJoint at {MAX_BEND_RAD:.4f} rad, Nimble does not",
+                    f"OpenSim limits the bend of a ConstantCurvatureJoint to {MAX_BEND_RAD:.4f} rad, Nimble does not",
                 )
             ]
     return []

@@ -64,7 +64,7 @@ def add_strength_limits(
         limits[joint.name] = total
         unit = "N" if joint.kind == "prismatic" else "N m"
         for path, force in actuators:
-            done = "left out, but for its greatest force, which is the joint's effort limit"
+            done = "left out; only its maximum force is written, as the effort limit of the joint"
             fidelity.add(
                 "actuator",
                 path,

@@ -21,7 +21,7 @@ from osimlite.simulation.robot.couplings import Mimic, find_mimics, list_coupler
 from osimlite.simulation.robot.robot import Robot, RobotJoint, breaks_triangle_rule, principal_axes
 from osimlite.translate.fidelity import LEFT_OUT, Fidelity
 
-COMPUTE_ADVICE = "your program computes its value by the function in .coordinates.json"
+COMPUTE_ADVICE = "your program must compute its value with the function in .coordinates.json"
 """Advice for a joint that the robot file leaves free."""
 
 CONTAINERS = (ModelComponentSet, WrapObjectSet, FrameGeometry)
@@ -118,7 +118,7 @@ class _Survey:
             self.note(
                 "units",
                 "/",
-                "that the model's units are words for people",
+                "names of units in the model, which have no effect",
                 "numbers written as m, kg, s, rad",
             )
         # In URDF gravity belongs to the simulator, not to the robot.
@@ -140,7 +140,7 @@ class _Survey:
                     "loop",
                     joint_of_body[path],
                     "a closed loop of joints",
-                    "cut: the joint carries a part of the body's mass, and nothing holds the parts together",
+                    "cut: a second part of the body, with a part of its mass, is at this joint; nothing holds the parts together",
                     f"link {link.name}",
                 )
                 continue
@@ -150,22 +150,27 @@ class _Survey:
                     "loose-body",
                     path,
                     "a body without a joint",
-                    "free of ground, as in OpenSim",
+                    "free to move relative to ground, as in OpenSim",
                     joint_of_body[path],
                 )
             if len(link.bodies) > 1 and path != "/ground":
                 massless = (
-                    " without its mass, for it does not move" if "/ground" in link.bodies else ""
+                    " without its mass, because the link does not move"
+                    if "/ground" in link.bodies
+                    else ""
                 )
                 merged = f"merged into link {link.name}{massless}"
                 self.note(
-                    "merged-body", path, "bodies welded together as links of their own", merged
+                    "merged-body",
+                    path,
+                    "bodies that are welded together, as separate links",
+                    merged,
                 )
             elif path != "/ground" and link.name != path.rsplit("/", 1)[1]:
                 self._record_new_name(path, f"link {link.name}")
             # Forward dynamics is singular if nothing resists the last joint.
             if link.mass == 0.0 and link.name in self._moving_ends:
-                done = "written as it is; PyBullet holds its last joint still"
+                done = "written unchanged; PyBullet keeps the last joint of the chain fixed"
                 self.note("massless-end", path, "a body without mass at the end of a chain", done)
             moments, _ = principal_axes(link.inertia)
             if breaks_triangle_rule(moments):
@@ -173,7 +178,7 @@ class _Survey:
                     "inertia",
                     path,
                     "an inertia that no body can have (one principal moment exceeds the sum of the others)",
-                    "written as it is; PyBullet takes zero instead, MuJoCo refuses the file",
+                    "written unchanged; PyBullet uses zero instead, MuJoCo rejects the file",
                     "moments " + ", ".join(f"{moment:g}" for moment in moments) + " kg m^2",
                 )
 
@@ -203,7 +208,7 @@ class _Survey:
                     "massless-link",
                     path,
                     "a joint with several axes, or with an axis that does not pass through the origin of its child body",
-                    "a chain of one-axis joints with massless links between (1e-9 kg in MuJoCo)",
+                    "a chain of joints with one axis each, connected by massless links (1e-9 kg in MuJoCo)",
                     f"links {' '.join(middle_links)}",
                 )
             coordinate_indices = {
@@ -215,7 +220,7 @@ class _Survey:
                     "ball-joint",
                     path,
                     "a ball joint: three rotations at once, whose speeds are an angular velocity",
-                    "three revolute joints: singular where the second stands at +-90 degrees; their speeds are the "
+                    "three revolute joints: singular where the second angle is +-90 degrees; their speeds are the "
                     "rates of the angles",
                 )
 
@@ -369,10 +374,10 @@ class _Survey:
                 "frame",
                 path,
                 "a frame that is not a link",
-                "left out as a frame; what is fixed to it is in the body's link",
+                "left out as a frame; parts that are fixed to the frame are in the body's link",
                 f"in {owner} at ({x:g}, {y:g}, {z:g}) m",
             )
 
     def _record_new_name(self, path: str, name: str) -> None:
         """Record a new name."""
-        self.note("name", path, "the name of a component as it is", "renamed", name)
+        self.note("name", path, "the original name of a component", "renamed", name)

@@ -194,7 +194,7 @@ def test_actuators_of_a_coordinate_say_how_strong_its_joint_is():
 @pytest.mark.parametrize("limit", [0.0, -1.0, np.inf, np.nan])
 @pytest.mark.parametrize("what", ["effort", "velocity"])
 def test_impossible_limits_are_refused(what, limit):
-    with pytest.raises(OsimliteError, match=f"a limit of {what} is a positive number"):
+    with pytest.raises(OsimliteError, match=f"a limit of {what} must be a positive number"):
         to_urdf(one_body(), **{what: limit})
 
 

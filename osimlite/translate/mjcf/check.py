@@ -119,7 +119,7 @@ def _compare(mujoco: Any, model: Model, file: str | Path, poses: int, seed: int)
     }
     if not tendons:
         raise ModelError(
-            f"it has no tendon or actuator with the name of a muscle of the model, such as '{next(iter(owners))}'",
+            f"the file has no tendon or actuator with the name of a muscle of the model, such as '{next(iter(owners))}'",
             file=str(file),
         )
     sampled_poses, samples_by_path = draw_poses(paths, poses, seed)

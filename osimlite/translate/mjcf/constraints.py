@@ -25,7 +25,10 @@ def add_constraints(draft: MjcfDraft) -> None:
             if add_constraint is None:
                 description = f"a {type(constraint).__name__}"
                 draft.fidelity.add(
-                    "constraint", constraint.name, description, f"{LEFT_OUT}: MuJoCo has none"
+                    "constraint",
+                    constraint.name,
+                    description,
+                    f"{LEFT_OUT}: MuJoCo has no such constraint",
                 )
             else:
                 draft.fidelity.translated[constraint.name] = add_constraint(draft, constraint)

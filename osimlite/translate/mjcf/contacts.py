@@ -60,13 +60,13 @@ def add_contacts(draft: MjcfDraft) -> None:
     for force, path in draft.iterate_components(Force):
         if not isinstance(force, ContactForce) or not force.appliesForce:
             continue
-        description = f"contact by the law of a {type(force).__name__}"
+        description = f"the contact law of a {type(force).__name__}"
         try:
             pair_names = " ".join(_add_pairs(draft, force))
         except ModelError as error:
             draft.fidelity.add("contact", path, description, f"{LEFT_OUT}: {error}")
             continue
-        replacement = "MuJoCo's contact law: it carries the bodies, but forces and motions differ"
+        replacement = "MuJoCo's contact law: it supports the bodies, but forces and motions differ"
         draft.fidelity.add("contact", path, description, replacement, f"pairs {pair_names}")
 
 
@@ -108,7 +108,7 @@ def _make_geom(
         case ContactHalfSpace():
             box_frame = make_offset((HALF_SPACE_BOX_M[0] / 2.0, 0.0, 0.0), (0.0, 0.0, 0.0))
             size = " x ".join(f"{edge:g}" for edge in HALF_SPACE_BOX_M)
-            replacement = f"a box of {size} m whose face is its surface"
+            replacement = f"a box of {size} m, one face of which is the surface"
             draft.fidelity.add(
                 "contact-geometry", path, "a half space on a body that moves", replacement
             )

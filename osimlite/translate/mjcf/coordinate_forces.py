@@ -189,7 +189,9 @@ def _find_lead(
     path = draft.tree.path_of(draft.tree.target(force, "coordinate", force.coordinate)) or ""
     index = draft.mechanism.coordinate_index(path)
     if draft.mechanism.coordinates[index].locked:
-        raise Untranslatable("its coordinate is locked, so that it moves nothing")
+        raise Untranslatable("its coordinate is locked, so the force has no effect")
     if index not in draft.leads:
-        raise Untranslatable("its coordinate has no joint of its own, being a function of another")
+        raise Untranslatable(
+            "its coordinate is a function of another coordinate, and has no separate joint"
+        )
     return draft.leads[index], index

@@ -20,15 +20,15 @@ def add_coordinates(draft: MjcfDraft) -> None:
     for index, coordinate in enumerate(draft.mechanism.coordinates):
         leader = draft.leads.get(index)
         result = (
-            "locked: a part of the body that carries it"
+            "locked: its value is part of the body's fixed position"
             if coordinate.locked
-            else "what its joints follow"
+            else "the variable that its joints follow"
         )
         draft.fidelity.translated[coordinate.path] = (
             result if leader is None else f"joint {leader.joint}"
         )
         if leader is None and index not in moving and not coordinate.locked:
-            note("coordinate", coordinate.path, "a coordinate that moves nothing", "left out")
+            note("coordinate", coordinate.path, "a coordinate that moves no body", "left out")
         if leader is not None:
             draft.fidelity.note_name(coordinate.path, "joint", coordinate.name, leader.joint)
         # A scaled joint would need a scaled range, which users would misread.
@@ -42,7 +42,12 @@ def add_coordinates(draft: MjcfDraft) -> None:
                 # A range of a coordinate does not stop a motion in OpenSim.
                 element.set("limited", "false")
         if coordinate.clamped:
-            note("clamped", coordinate.path, "clamped range in user interfaces", "left out")
+            note(
+                "clamped",
+                coordinate.path,
+                "a clamped coordinate, which user interfaces keep in its range",
+                "left out",
+            )
         if coordinate.prescribed is not None and not coordinate.locked and leader is not None:
             start = coordinate.prescribed.evaluate(np.zeros(1))[0]
             # The driver evaluates the function of time at every step.
@@ -69,5 +74,6 @@ def add_coordinates(draft: MjcfDraft) -> None:
                 "speeds",
                 draft.tree.path_of(joint) or "",
                 "three rotations at once, whose speeds are an angular velocity",
-                "three hinges: the same coordinates, whose speeds are their rates; singular where OpenSim's are",
+                "three hinges with the same coordinates; their speeds are the rates of the coordinates; "
+                "singular in the same poses as in OpenSim",
             )

@@ -82,7 +82,7 @@ def add_couplings(draft: MjcfDraft) -> None:
     for index, path in coupler_by_coordinate.items():
         names = " ".join(joint.name for joint in robot.moving if index in joint.coordinates)
         draft.fidelity.translated[path] = (
-            f"equality {names}" if names else "what it binds is locked"
+            f"equality {names}" if names else "nothing: the coordinates that it couples are locked"
         )
     for coupler in list_couplers(robot):
         if coupler.dependent not in drivers:
@@ -113,7 +113,7 @@ def _add_follower(
     )
     fit = fit_quartic(exact, (first, last), unit)
     follower = Follower(leader.joint, fit.coefficients)
-    replacement = "a quartic, fitted"
+    replacement = "a fitted polynomial of degree four"
     # The driver replaces the quartic by the exact function, and needs no helper.
     if fit.error is not None and draft.options.spline == "series" and not draft.options.driver:
         inner, (outer,) = fit_composition([function], (lower, upper))
@@ -135,7 +135,7 @@ def _add_follower(
         draft.fidelity.add(
             "function",
             component_path,
-            "a joint that is a function of a coordinate, but not a polynomial of degree four",
+            "a joint that follows a coordinate by a function other than a polynomial of degree four",
             replacement,
             f"joint {joint.name} over {coordinate.name} from {lower:g} to {upper:g}",
             {"value": fit.error},
@@ -164,7 +164,7 @@ def _add_argument_joint(draft: MjcfDraft, coordinate_index: int) -> Lead:
     draft.fidelity.add(
         "argument",
         coordinate.path,
-        "a coordinate that no axis moves by, but only functions of it",
+        "a coordinate that moves axes only through functions",
         "a separate joint, which turns a small body",
         f"joint {name}, {inertia:.3g} kg m^2",
     )
@@ -275,7 +275,7 @@ def _hold_joint(draft: MjcfDraft, joint: RobotJoint) -> None:
         "function",
         joint.source,
         "a joint that is a function of several coordinates",
-        "held where it is in the default pose",
+        "fixed at its value in the default pose",
         f"joint {joint.name}",
         {"value": Error.measure(value_errors, unit)},
     )

@@ -152,7 +152,7 @@ def add_element(parent: _Element, tag: str, **attributes: Value) -> _Element:
             attributes.get(name), str
         ):
             raise UnsupportedError(
-                f"MJCF cannot say a number that is not finite: {name} of the {tag} '{texts.get('name', '')}' is {text}"
+                f"MJCF cannot contain a number that is not finite: {name} of the {tag} '{texts.get('name', '')}' is {text}"
             )
     return SubElement(parent, tag, texts)
 
@@ -236,7 +236,7 @@ class MjcfDraft:
             self.fidelity.add(
                 "default-pose",
                 "/",
-                "a default pose that the constraints do not allow, nor any pose near it",
+                "a default pose that violates the constraints, without an allowed pose near it",
                 "the pose of the model, with the constraints violated",
             )
             return self.mechanism.values({}), self.mechanism.speeds({})

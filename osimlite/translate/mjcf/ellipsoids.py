@@ -97,6 +97,7 @@ def _add_ellipsoid_follower(
         "ellipsoid",
         path,
         "a body that stays on an ellipsoid",
-        f"slides that follow a body of {SPECK_MASS_KG:g} kg, which is connected to a point ahead of the body on its z axis",
+        f"slide joints that follow a helper body of {SPECK_MASS_KG:g} kg; the helper is connected to a point "
+        "on the body's z axis",
         f"equality {equality}",
     )

@@ -176,13 +176,13 @@ def to_mjcf(
         UnsupportedError: a joint or constraint is not supported.
     """
     if mujoco not in (3, 4):
-        raise SettingError(f"MJCF is written for MuJoCo 3 or 4, not {mujoco}")
+        raise SettingError(f"mujoco must be 3 or 4, not {mujoco}")
     if contact not in ("native", "none"):
-        raise SettingError(f"contact is 'native' or 'none', not '{contact}'")
+        raise SettingError(f"contact must be 'native' or 'none', not '{contact}'")
     if fit not in ("none", "wraps", "force"):
-        raise SettingError(f"fit is 'none', 'wraps' or 'force', not '{fit}'")
+        raise SettingError(f"fit must be 'none', 'wraps' or 'force', not '{fit}'")
     if spline not in ("quartic", "series"):
-        raise SettingError(f"spline is 'quartic' or 'series', not '{spline}'")
+        raise SettingError(f"spline must be 'quartic' or 'series', not '{spline}'")
     mechanism = build_mechanism(model)
     fidelity = Fidelity(mechanism.name, f"mjcf {mujoco}")
     model_folder = None if folder is None else Path(folder)

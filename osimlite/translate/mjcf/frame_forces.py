@@ -57,9 +57,7 @@ def add_point_to_point_actuator(draft: MjcfDraft, force: PointToPointActuator, p
         Untranslatable: its points are fixed in ground.
     """
     if force.points_are_global:
-        raise Untranslatable(
-            "its points are given in ground, so that they wander through the bodies"
-        )
+        raise Untranslatable("its points are fixed in ground, so they move relative to the bodies")
     site_names = [
         _add_point_site(draft, force, path, "bodyA", force.pointA),
         _add_point_site(draft, force, path, "bodyB", force.pointB),
@@ -120,7 +118,7 @@ def add_point_actuator(draft: MjcfDraft, force: PointActuator, path: str) -> str
     """
     if force.point_is_global:
         # A direction in ground needs a site there as the reference.
-        raise Untranslatable("its point is given in ground, so that it wanders through the body")
+        raise Untranslatable("its point is fixed in ground, so it moves relative to the body")
     gear = np.append(_normalize_axis(force.direction) * force.optimal_force, np.zeros(3))
     site = _add_point_site(draft, force, path, "body", force.point)
     return _add_site_motor(
@@ -193,7 +191,7 @@ def add_body_actuator(draft: MjcfDraft, force: BodyActuator, path: str) -> str:
         Untranslatable: its point is fixed in ground.
     """
     if force.point_is_global:
-        raise Untranslatable("its point is given in ground, so that it wanders through the body")
+        raise Untranslatable("its point is fixed in ground, so it moves relative to the body")
     site = _add_point_site(draft, force, path, "socket_body", force.point)
     axes = draft.add_site(path, *GROUND_FRAME) if force.spatial_force_is_global else None
     # MuJoCo's gear has the force first, and then the torque.

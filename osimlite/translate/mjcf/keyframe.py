@@ -18,11 +18,11 @@ def add_keyframe(draft: MjcfDraft) -> None:
     try:
         draft.mechanism.acceleration(q, u)
     except SimulationError as error:
-        consequence = "as it is: the file can be posed, but what its motions are means nothing"
+        consequence = "written unchanged: poses are correct, but simulated motions are meaningless"
         draft.fidelity.add(
             "singular",
             "/",
-            "a motion without inertia, which OpenSim has no acceleration for",
+            "a coordinate that moves no mass, for which OpenSim cannot compute the acceleration",
             consequence,
             error.message,
         )

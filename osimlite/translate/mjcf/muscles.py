@@ -189,7 +189,7 @@ def add_muscle(draft: MjcfDraft, force: Muscle, path: str) -> str:
     fvmax = rates.fvmax
     if not min(vmax, fvmax) > MIN_POSITIVE:
         raise Untranslatable(
-            "its greatest velocity, or what it holds while it lengthens, is not positive"
+            "its maximum contraction velocity or its eccentric force is not positive"
         )
     fits = draft.options.fit == "force"
     try:
@@ -245,7 +245,9 @@ def add_muscle(draft: MjcfDraft, force: Muscle, path: str) -> str:
         )
         + rates.note
         + (
-            "" if has_activation else "; without activation dynamics: it has its full force at once"
+            ""
+            if has_activation
+            else "; without activation dynamics: the activation is equal to the control"
         ),
         f"actuator {name}",
         {"isometric force": Error.measure(force_errors, "Fmax")} if len(force_errors) else {},
@@ -311,8 +313,8 @@ def _read_rates(force: Muscle) -> Rates:
     rise = time / activation_rate / RISE_TO_63_PERCENT if activation_rate > 0.0 else 0.0
     fall = time / deactivation_rate / FALL_TO_37_PERCENT if deactivation_rate > 0.0 else 0.0
     note = (
-        "; velocity from its time_scale, activation with MuJoCo's time constants, which change with activation: "
-        "as fast up to 63 % and down to 37 % as its own"
+        "; velocity from its time_scale. MuJoCo's time constants change with activation: rising to 63 % and falling to 37 % "
+        "take as long as in the model"
     )
     return Rates(vmax / time, fvmax, rise, fall, note)
 

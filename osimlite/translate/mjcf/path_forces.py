@@ -59,7 +59,7 @@ def add_spring(draft: MjcfDraft, force: PathSpring, path: str) -> str:
     )
     draft.record_result(path, f"tendon {path_tendon.name}")
     if force.dissipation:
-        lost_behaviour = "damping that grows with the stretch"
+        lost_behaviour = "damping that is proportional to the stretch"
         draft.fidelity.add(
             "damping", path, lost_behaviour, "no damping", f"dissipation {force.dissipation:g} s/m"
         )
@@ -96,7 +96,7 @@ def add_ligament(draft: MjcfDraft, force: Ligament | Blankevoort1991Ligament, pa
         "ligament",
         path,
         "a ligament whose tension is not linear in its length",
-        "the nearest spring without damping",
+        "the best-fitting linear spring, without damping",
         f"tendon {path_tendon.name}: {stiffness:g} N/m beyond {rest_length:g} m",
         {
             "tension": Error.measure(

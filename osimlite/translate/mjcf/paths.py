@@ -98,7 +98,7 @@ def add_paths(draft: MjcfDraft) -> None:
             surface = (
                 draft.tree.path_of(draft.tree.target(wrap, "wrap_object", wrap.wrap_object)) or ""
             )
-            draft.fidelity.translated[surface] = "what tendons go around, if they touch it"
+            draft.fidelity.translated[surface] = "a geom that tendons wrap around"
         errors = _measure_errors(draft, tendon, test_poses, test_samples[path])
         # Exact tendons need no record.
         if any(error.max > EXACT_TOLERANCE_M for error in errors.values()):

@@ -125,7 +125,9 @@ def sample_function(function: f.SmoothFunction, x: Array) -> Array:
     """
     values = np.array([function.evaluate(np.array((value,)))[0] for value in x])
     if not (np.abs(values) < _MAX_VALUE).all():
-        raise FloatingPointError("a function has values that nothing can be fitted to")
+        raise FloatingPointError(
+            "a function has values that are too large for a fit, or not finite"
+        )
     return values
 
 

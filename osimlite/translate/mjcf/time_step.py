@@ -51,21 +51,23 @@ def choose_step(draft: MjcfDraft) -> None:
         rate = _compute_fastest_rate(draft)
     except OsimliteError as error:
         rate = 0.0
-        description = "springs that may be too stiff: how stiff they are cannot be computed"
+        description = "springs that may be too stiff; their stiffness cannot be computed"
         draft.fidelity.add(
             "stiff",
             "/",
             description,
-            f"steps of {DEFAULT_STEP_S:g} s, be they too long or not",
+            f"steps of {DEFAULT_STEP_S:g} s, which may be too long",
             error.message,
         )
     if rate * DEFAULT_STEP_S > 2.0:
         # Half of the stability limit, with one digit.
         step = float(f"{1.0 / rate:.0e}")
         next(draft.root.iter("option")).set("timestep", format_value(step))
-        description = f"springs too stiff for steps of {DEFAULT_STEP_S:g} s, which would end in NaN"
-        detail = f"{step:g} s, for a rate of {rate:.3g} 1/s about the default pose"
-        draft.fidelity.add("stiff", "/", description, "the file takes smaller steps", detail)
+        description = (
+            f"springs that are too stiff for steps of {DEFAULT_STEP_S:g} s; states would become NaN"
+        )
+        detail = f"{step:g} s, because the fastest rate near the default pose is {rate:.3g} 1/s"
+        draft.fidelity.add("stiff", "/", description, "the file sets smaller steps", detail)
     for path, path_tendon in draft.tendons.items():
         muscle = draft.tree.by_path[path]
         tension = 0.0
@@ -77,9 +79,11 @@ def choose_step(draft: MjcfDraft) -> None:
             # Passive tension above the strength: the default pose is beyond the range of the
             # fibers.
             if tension > muscle.max_isometric_force:
-                description = "fibers that are longer in the default pose than they can bear"
-                consequence = "as it is: the model may run away, in smaller steps too"
-                detail = f"they pull {tension / muscle.max_isometric_force:.2g} times max_isometric_force at rest"
+                description = "fibers that are stretched too far in the default pose"
+                consequence = (
+                    "written unchanged: the simulation may diverge, even with smaller steps"
+                )
+                detail = f"their passive force is {tension / muscle.max_isometric_force:.2g} times max_isometric_force"
                 draft.fidelity.add("overstretched", path, description, consequence, detail)
 
 

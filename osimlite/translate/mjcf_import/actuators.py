@@ -75,7 +75,9 @@ def add_actuators(draft: ConversionDraft) -> None:
             _add_site_actuator(draft, actuator, target)
         else:
             draft.drop(
-                "actuator", actuator, "an actuator that acts by adhesion, a crank or in another way"
+                "actuator",
+                actuator,
+                "an actuator that acts through adhesion, a slider-crank or another unsupported transmission",
             )
     _add_tendon_springs(draft)
 
@@ -245,7 +247,7 @@ def _add_joint_muscle(draft: ConversionDraft, actuator: int, joint: int) -> None
         draft.record(
             "actuator",
             actuator,
-            "a muscle that acts on a joint without a path",
+            "a muscle that acts directly on a joint, without a path",
             "a FunctionBasedPath: a linear function of the coordinate",
         )
 

@@ -34,7 +34,10 @@ def add_bodies(draft: ConversionDraft) -> None:
         add_joints(draft, body, frame, parent)
         if model.body_mocapid[body] >= 0:
             draft.record(
-                "body", body, "a body that a program moves (mocap)", "welded where it stands"
+                "body",
+                body,
+                "a body that a program moves (mocap)",
+                "welded at its default position",
             )
         if model.body_gravcomp[body]:
             draft.record(

@@ -290,6 +290,6 @@ def _add_force(
         "geom",
         geom,
         "contact by MuJoCo's soft constraint",
-        "a HuntCrossleyForce that yields as far under the weight of the bodies; motions differ",
+        "a HuntCrossleyForce with the same depth under the weight of the bodies; motions differ",
         f"force {name}, stiffness {stiffness:.4g} N/m^2, {depth:.3g} m under {weight:.4g} N",
     )

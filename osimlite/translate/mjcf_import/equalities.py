@@ -24,7 +24,7 @@ from osimlite.translate.mjcf_import.draft import (
     vector,
 )
 
-SOFT = "a soft constraint, which a load opens"
+SOFT = "a soft constraint, which yields under load"
 
 
 def add_equalities(draft: ConversionDraft) -> None:

@@ -158,7 +158,7 @@ def add_joints(draft: ConversionDraft, body: int, frame: Body, parent: PhysicalF
             "body",
             body,
             "joints with different anchors, or a slide after a hinge",
-            "several joints with bodies of zero mass between them, which move the same",
+            "several joints, connected by bodies without mass; the motion is the same",
             f"{len(groups) - 1} helper bodies",
         )
 
@@ -250,7 +250,7 @@ def _make_special_joint(
         joint,
         "a quaternion, and speeds that are an angular velocity",
         "three body-fixed X-Y-Z angles, which are 0 at the default orientation; poses are the "
-        "same, but 90 degrees of the second angle is singular",
+        "same, but the angles are singular where the second is 90 degrees",
         "coordinates " + " ".join(draft.coordinates[joint]),
     )
     if bool(model.jnt_limited[joint]):
@@ -406,7 +406,7 @@ def _add_armature(draft: ConversionDraft, joint: int, name: str) -> None:
         "joint",
         joint,
         "armature",
-        "a rotor with that inertia, which turns in ground as the coordinate does (exact)",
+        "an additional body (rotor) with this inertia, which a coupler turns with the coordinate (exact)",
         f"armature {armature:g} {unit}, body {rotor.name}",
     )
 
@@ -418,7 +418,11 @@ def _add_limit(draft: ConversionDraft, joint: int, name: str) -> None:
     text = f"range {lower:g} to {upper:g}"
     if draft.options.limits == "range":
         draft.record(
-            "joint", joint, "a soft joint limit", "the range of the coordinate alone", text
+            "joint",
+            joint,
+            "a soft joint limit",
+            "only the range of the coordinate is written",
+            text,
         )
         return
     dof = int(model.jnt_dofadr[joint])

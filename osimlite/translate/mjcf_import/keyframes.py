@@ -51,7 +51,7 @@ def add_keyframes(draft: ConversionDraft) -> None:
                 "key",
                 key,
                 f"{', '.join(lost_quantities)} of a keyframe",
-                f"the pose alone, in row {key} of {file}",
+                f"only the pose is written, in row {key} of {file}",
             )
         else:
             draft.note_result("key", key, f"row {key} of {file}")

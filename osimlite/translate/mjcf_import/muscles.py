@@ -265,8 +265,9 @@ def _make_exact(
         draft.record(
             "actuator",
             actuator,
-            "activation dynamics beside MuJoCo's own curves",
-            "a RigidTendonMuscle with MuJoCo's curves as formulas: its control is the activation",
+            "activation dynamics of a muscle with MuJoCo's own curves",
+            "a RigidTendonMuscle with MuJoCo's curves as formulas, without activation dynamics: the "
+            "activation is equal to the control",
             f"time constants {activation_time:g} and {deactivation_time:g} s{detail}",
         )
     else:
@@ -276,7 +277,7 @@ def _make_exact(
             "actuator",
             actuator,
             f"a passive force of more than {MOST_PASSIVE:g} times the isometric force",
-            "it ends there",
+            "limited to this force",
         )
     return muscle
 
@@ -293,10 +294,13 @@ def _record_dynamics(draft: ConversionDraft, actuator: int, has_activation: bool
             "actuator",
             actuator,
             "a smooth change between the time constants of activation",
-            "a change at once",
+            "an abrupt change",
             f"width {float(model.actuator_dynprm[actuator, 2]):g}",
         )
     if not has_activation and int(model.actuator_dyntype[actuator]):
         draft.record(
-            "actuator", actuator, "activation dynamics other than a muscle's", "none at all"
+            "actuator",
+            actuator,
+            "activation dynamics other than a muscle's",
+            "no activation dynamics",
         )

@@ -180,7 +180,7 @@ def _explain_failure(path: Path, message: str) -> DocumentError:
     if "opening file" in text:
         hint = "; included files and meshes must be where the file names them"
     elif "mujocoinclude" in text:
-        hint = "; it is a part of other files: convert the file that includes it"
+        hint = "; this file is a part of other files: convert the file that includes it"
     return DocumentError(
         f"MuJoCo rejects the file: {text}{hint}",
         file=str(path),

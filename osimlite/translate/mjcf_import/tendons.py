@@ -376,9 +376,9 @@ class _Selection:
             reason = (
                 "pulleys"
                 if tendon.has_pulley
-                else "a tendon that bends inside of a geom"
+                else "a tendon that bends inside a geom"
                 if row not in routes
-                else "a tendon that no wrap surface follows"
+                else "a tendon that no wrap surface can represent"
             )
             if row in polynomials:
                 path = polynomials[row][0]
@@ -400,7 +400,7 @@ class _Selection:
                     "a GeometryPath through the sites of the first branch, straight between them"
                     if tendon.has_pulley
                     else "a GeometryPath, straight between the sites",
-                    "no hinge or slide moves it, so that it has no polynomial of coordinates",
+                    "no hinge or slide moves the tendon, so a polynomial of coordinates is impossible",
                     errors,
                 )
             elif errors["length"].max > EXACT_M and row in geodesics:
@@ -417,7 +417,7 @@ class _Selection:
                     "tendon",
                     tendon.number,
                     f"the way around a geom by the rules of MuJoCo {self.version}",
-                    "a GeometryPath with wrap surfaces of the quadrant that is nearest",
+                    "a GeometryPath whose wrap surfaces have the best-fitting quadrant",
                     "quadrants " + " ".join(used_quadrants),
                     errors,
                 )
@@ -439,9 +439,9 @@ class _Selection:
                 draft.record(
                     "tendon",
                     tendon.number,
-                    "neighbouring sites in one place in the default pose",
-                    "a path without a direction there: OpenSim computes no accelerations in this "
-                    "pose; start from another one",
+                    "neighbouring sites at the same position in the default pose",
+                    "a path without a direction between the two: OpenSim cannot compute accelerations "
+                    "in this pose; start from another pose",
                     f"'{names[0]}' and '{names[1]}'",
                 )
 
@@ -514,7 +514,7 @@ def _make_linear_path(draft: ConversionDraft, tendon: Tendon) -> TendonPath:
             "tendon",
             tendon.number,
             "a length that is negative in some poses",
-            "a FunctionBasedPath with a linear function and a constant, which keeps it positive",
+            "a FunctionBasedPath with a linear function, whose constant keeps the length positive",
             f"constant {shift:g}",
         )
     else:

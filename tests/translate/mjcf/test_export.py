@@ -169,7 +169,7 @@ def test_what_mujoco_would_refuse_is_told_and_mended():
 @pytest.mark.parametrize(
     ("choice", "said"),
     [
-        ({"mujoco": 2}, "MuJoCo 3 or 4, not 2"),
+        ({"mujoco": 2}, "must be 3 or 4, not 2"),
         ({"contact": "soft"}, "'native' or 'none', not 'soft'"),
     ],
 )

@@ -201,7 +201,7 @@ def test_sites_in_one_place_are_recorded(tmp_path):
         return [
             record.detail
             for record in osimlite.from_mjcf(path, keyframe=keyframe).fidelity
-            if record.component == "/tendon/t" and "in one place" in record.cannot_say
+            if record.component == "/tendon/t" and "at the same position" in record.cannot_say
         ]
 
     assert find(None) == ["'outer' and 'inner'"]
