@@ -434,7 +434,7 @@ def _open_special(target: Path) -> Iterator[BinaryIO]:
         with open(handle, "wb") as stream:
             yield stream
     except OSError as error:
-        reason = "nobody reads this pipe" if error.errno == errno.ENXIO else error.strerror
+        reason = "no program reads from this pipe" if error.errno == errno.ENXIO else error.strerror
         raise OsimliteError(f"cannot write the file: {reason}", file=str(target)) from None
 
 

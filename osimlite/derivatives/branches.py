@@ -80,7 +80,7 @@ def run_until_mergeable(function: Callable[[], Any]) -> Any:
         Result of the function.
 
     Raises:
-        NoFormula: a part depends on the state in a way that has no formula.
+        NoFormula: a part depends on the state in a way that cannot be written as a formula.
     """
     while True:
         run.frame = None
@@ -93,7 +93,7 @@ def run_until_mergeable(function: Callable[[], Any]) -> Any:
             # Widening the same part twice does not help, so this ends the loop.
             if wider.part in run.widened:
                 raise NoFormula(
-                    f"{wider.part} depends on the state in a way that has no formula"
+                    f"{wider.part} depends on the state in a way that cannot be written as a formula"
                 ) from None
             # The run is repeated from its beginning, since earlier code may have used the narrower
             # branch.

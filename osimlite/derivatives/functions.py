@@ -424,7 +424,7 @@ class CasadiModel(SymbolicModel):
             )
         if self._path_function is not None:
             raise UnsupportedError(
-                "paths around surfaces have no formula, so that files cannot contain them; replace them by "
+                "paths around surfaces have no formula, so they cannot be written to files; replace them by "
                 "polynomials first (osimlite modify --replace paths=polynomial)"
             )
         make_folder(folder)

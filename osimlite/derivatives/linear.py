@@ -207,6 +207,8 @@ def _fill_vector(noun: str, names: Sequence[str], default: Array, user_values: A
             result[names.index(name)] = value
     elif user_values is not None:
         if len(user_values) != len(names):
-            raise SettingError(f"the model has {len(names)} {noun}s, not {len(user_values)}")
+            raise SettingError(
+                f"expected {len(names)} values, one for each {noun} of the model; got {len(user_values)}"
+            )
         result[:] = user_values
     return result

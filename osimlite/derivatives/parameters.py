@@ -188,7 +188,9 @@ def _read_value(name: str, setters: Sequence[PropertySetter]) -> float:
     """
     values = {setter.get_value() for setter in setters}
     if len(values) > 1:
-        raise SettingError(f"'{name}' stands for numbers that differ; name them one by one")
+        raise SettingError(
+            f"'{name}' matches properties with different values; name these properties one by one"
+        )
     return values.pop()
 
 
@@ -225,7 +227,7 @@ def _check_linear(
         <= LINEARITY_TOLERANCE * size
     ):
         raise UnsupportedError(
-            f"{description} cannot stay a symbol: the numbers of the equations are no linear function of it; "
+            f"{description} cannot be a symbol: the equations do not depend on it linearly; "
             "change it in the model and create the functions again"
         )
 

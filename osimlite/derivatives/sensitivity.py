@@ -151,8 +151,8 @@ def sensitivity(
     for name in options:
         if name not in OPTIONS:
             raise SettingError(
-                f"'{name}' is not an option of sensitivities, which follow Merson's steps of the model; "
-                f"leave it out ({', '.join(sorted(OPTIONS))} can be chosen)"
+                f"'{name}' is not an option of sensitivities, which always use the integrator 'merson'; "
+                f"leave it out (possible options: {', '.join(sorted(OPTIONS))})"
             )
     accuracy = options["accuracy"] = options.get("accuracy") or DEFAULT_ACCURACY
     folder = Path(options.get("folder") or ".")
@@ -351,7 +351,8 @@ class _SensitivityRun:
                 int(np.argmax(np.where(np.isfinite(differences), differences, np.inf)))
             ]
             raise SettingError(
-                f"at {t:g} s the tangents have another derivative of '{worst_state}' than the motion; create them from this "
+                f"at {t:g} s the derivative of '{worst_state}' differs between tangents and motion; create "
+                "the tangents from this "
                 "model"
             )
 

@@ -26,7 +26,7 @@ from osimlite.simulation.pack import PackedModel
 
 WRAPPED_PATH_REASON = "its path runs around surfaces; replace it by a fitted FunctionBasedPath"
 """Reason and remedy for paths around surfaces."""
-MESH_REASON = "meshes in contact have none; use spheres and half spaces"
+MESH_REASON = "contact of meshes is not supported; use spheres and half spaces"
 """Reason and remedy for contact of meshes."""
 ELLIPSOID_REASON = "contact points of ellipsoids are found by a search; use spheres"
 """Reason and remedy for contact of ellipsoids."""

@@ -75,7 +75,7 @@ def describe_fit(
         yield f"unseen in some frames: {join_words(unseen_shares)}"
     if result["frames_unseen"]:
         frames = format_count(result["frames_unseen"], "frame")
-        yield f"{frames} without any measurement that has a weight: the pose of the frame before is kept"
+        yield f"{frames} without a measurement of positive weight: these frames get the pose of the frame before"
     if motion.undetermined:
         yield (
             f"{UNDETERMINED} "

@@ -37,9 +37,9 @@ class Measurements:
             raise DocumentError(f"the data have {self.noun}s but no frames", file=self.file)
         if self.values.shape != (len(self.times), len(self.names), *self.shape):
             raise SettingError(
-                f"the values of {len(self.names)} {self.noun}s at {len(self.times)} times are an "
-                "array of that many "
-                f"times, {self.noun}s and {' × '.join(map(str, self.shape))} numbers; got "
+                f"expected an array of shape "
+                f"{' × '.join(map(str, (len(self.times), len(self.names), *self.shape)))} "
+                f"(times × {self.noun}s × numbers of each); got "
                 f"{' × '.join(map(str, self.values.shape))}"
             )
         expect_increasing_times(self.times, self.file)
@@ -66,8 +66,8 @@ class Measurements:
         counts = {value.shape for value in values}
         if len(counts) != 1 or next(iter(counts))[1:] != cls.shape:
             raise SettingError(
-                f"every {cls.noun} has {' × '.join(map(str, cls.shape))} numbers for each frame, "
-                "and all have the same number of frames"
+                f"expected {' × '.join(map(str, cls.shape))} numbers per frame for every {cls.noun}, "
+                "and the same number of frames for all"
             )
         (count, *_), *_ = counts
         moments = (

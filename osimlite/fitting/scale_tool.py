@@ -185,12 +185,14 @@ def _create_measurements(pairs: MeasurementPairs) -> list[Measurement]:
     for name, (_, scaled_bodies) in pairs.items():
         if not isinstance(scaled_bodies, Mapping):
             raise SettingError(
-                f"measurement '{name}' must have pairs of markers, and by body the axes that they "
+                f"measurement '{name}' must have pairs of markers, and for each body the axes to "
                 "scale"
             )
         for body, axes in scaled_bodies.items():
             if not axes or not {*axes.lower()} <= {*"xyz"}:
-                raise SettingError(f"'{axes}' of '{body}' are not axes; write letters of XYZ")
+                raise SettingError(
+                    f"'{axes}' of '{body}' are not axes; write one or more of the letters X, Y and Z"
+                )
     return [
         Measurement(
             name=name,

@@ -142,8 +142,8 @@ class SelectedFrames:
             number = format_count(int(is_outlier[:, index].sum()), "frame")
             self.notes.append(
                 f"{self.markers[index]} is left out in {number} of {join_words(trial_names)}: up to "
-                f"{100.0 * np.nanmax(distances[:, index]):.0f} cm away; it may have been taken for "
-                "another"
+                f"{100.0 * np.nanmax(distances[:, index]):.0f} cm from its fitted position; it may be labelled as "
+                "another marker there"
             )
         self.measured[is_outlier] = np.nan
         return bool(is_outlier.any())

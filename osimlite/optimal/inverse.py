@@ -192,7 +192,9 @@ def _read_kinematics(
     tracked = [name for name in names if name in table.columns]
     if not tracked:
         raise context.invalid_error(
-            tool, "kinematics has no column such as " + (names[0] if names else "a coordinate")
+            tool,
+            "kinematics has no column with a coordinate of the model, such as "
+            + (names[0] if names else "a coordinate"),
         )
     check_columns(table, tracked)
     values = np.tile([info.default_value for info in infos], (len(table.times), 1))

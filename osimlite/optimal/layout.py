@@ -128,7 +128,7 @@ class VariableLayout:
         for index in np.flatnonzero(~(self.lower <= self.upper))[:1]:
             range_text = f"from {self.lower[index]:g} to {self.upper[index]:g}"
             message = (
-                f"all bounds of '{self.describe_variable(index)}' exclude each other ({range_text})"
+                f"the bounds of '{self.describe_variable(index)}' leave no value ({range_text})"
             )
             raise self.problem.invalid_error(self.problem.phase, message)
 

@@ -484,7 +484,7 @@ class Problem(StudyContext):
         if self.functions.constraints.size1_out(0) != count:
             raise self.make_unsupported_error(
                 self.phase,
-                "constraints on speeds alone are not supported",
+                "constraints that concern only speeds are not supported",
             )
 
     def _make_mesh(self) -> Array:
@@ -544,7 +544,7 @@ class Problem(StudyContext):
         for factor in [factor for goal in self.phase.goals for factor in goal.scale_factors]:
             if factor.name not in self._scaled:
                 # OpenSim's method addScaleFactor() receives the column, and its files do not store it.
-                message = "a file cannot say which column it scales, and OpenSim ignores scale factors in files"
+                message = "a file does not store which column a scale factor scales, and OpenSim ignores scale factors in files"
                 raise self.make_unsupported_error(
                     factor, f"{message}; in Python, pass `scaled` to osimlite.moco.solve"
                 )

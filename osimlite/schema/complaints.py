@@ -43,9 +43,7 @@ def describe_validation_error(cls: type[Object], error: ValidationError) -> str:
     reason = first_error["msg"].removeprefix("Value error, ")
     value = first_error.get("input")
     angle = re.fullmatch(r"\s*([-+.\d]+)\s*(deg|°)\s*", value) if isinstance(value, str) else None
-    hint = (
-        f"; give the number alone, and what is in rad as math.radians({angle[1]})" if angle else ""
-    )
+    hint = f"; give a plain number, for an angle in rad math.radians({angle[1]})" if angle else ""
     return f"{cls.__name__}.{location}: {reason}{hint}"
 
 

@@ -200,7 +200,7 @@ class _Compiler:
     def _take_character(self) -> str:
         character = self._peek_character()
         if not character:
-            raise PatternError("the pattern ends in the middle of something")
+            raise PatternError("the pattern ends too early")
         self.index += 1
         return character
 
@@ -302,7 +302,7 @@ class _Compiler:
         if not self._skip_text("}"):
             raise PatternError(f"a '}}' is missing at character {self.index + 1}")
         if max_count is not None and max_count < min_count:
-            raise PatternError(f"a repetition of {min_count} to {max_count} times is none")
+            raise PatternError(f"a repetition of {min_count} to {max_count} times is impossible")
         return min_count, max_count
 
     def _read_number(self) -> int:
@@ -436,7 +436,7 @@ class _Compiler:
             self.index += 1
             high = self._read_bracket_item(tests)
             if high is None or high < low:
-                raise PatternError(f"the range from '{low}' ends nowhere")
+                raise PatternError(f"the range from '{low}' has no end, or an end before its start")
             tests.append(_make_range_test(low, high))
         return lambda letter: any(test(letter) for test in tests) != is_negated
 

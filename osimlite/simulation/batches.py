@@ -90,14 +90,16 @@ class BatchOptions(IntegrationOptions):
             raise SettingError(f"the runs must end at 0 s or later, not at {self.to} s")
         # The pairs begin at 0 s, since no report is before the start.
         if not all(earlier <= later for earlier, later in pairwise([0.0, *self.report_times])):
-            raise SettingError("the report times do not increase from 0 on; sort them")
+            raise SettingError(
+                "the report times must not decrease, and must begin at 0 s or later; sort or correct them"
+            )
         for number, least, option in (
             (1 if self.threads is None else self.threads, 1, "threads"),
             (self.most_events, 0, "most_events"),
             (self.most_tries, 0, "most_tries"),
         ):
             if number < least:
-                raise SettingError(f"{option} is at least {least}, not {number}")
+                raise SettingError(f"{option} must be at least {least}, not {number}")
 
 
 class BatchEngine(Engine, Protocol):

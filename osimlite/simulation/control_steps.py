@@ -196,8 +196,8 @@ class KernelController:
         # before the last state.
         if not 0.0 <= end - earlier_record.times[-1] < self.step * (1.0 + TIME_TOLERANCE):
             raise SettingError(
-                f"the record of the controller ends at {earlier_record.times[-1]:g} s, "
-                f"the states at {end:g} s; use files of one run"
+                f"controller.sto ends at {earlier_record.times[-1]:g} s, "
+                f"but states.sto ends at {end:g} s; use files of the same run"
             )
 
     def make_runs(

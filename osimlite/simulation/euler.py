@@ -29,7 +29,7 @@ def make_divergence_error(t: float, h: float) -> IntegrationError:
         h: length of the steps, s.
     """
     return IntegrationError(
-        f"the motion diverges at t = {t:.9g} s; take a shorter fixed step than {h:g} s, "
+        f"the motion diverges at t = {t:.9g} s; use a shorter fixed step than {h:g} s, "
         "or control the error (--accuracy)",
         t,
     )
@@ -107,7 +107,7 @@ class SemiImplicitEuler(Stepper):
             result = self._projected(t, y, FIXED_STEP_TOLERANCE)
             if result is None:
                 raise IntegrationError(
-                    f"the constraints cannot be enforced at t = {t:.9g} s; take a shorter fixed step than {h:g} s, "
+                    f"the constraints cannot be enforced at t = {t:.9g} s; use a shorter fixed step than {h:g} s, "
                     "or control the error (--accuracy)",
                     t,
                 )
@@ -119,7 +119,7 @@ class SemiImplicitEuler(Stepper):
             self._accept_step(t, y)
         except IntegrationError as error:
             raise IntegrationError(
-                f"{error} If all of these are correct, take a shorter fixed step than {self._h:g} s, or control the error "
+                f"{error} If all of these are correct, use a shorter fixed step than {self._h:g} s, or control the error "
                 "(--accuracy).",
                 t,
                 error.index,

@@ -66,7 +66,7 @@ def replace_by_ideal_actuators(model: Model, physiology: bool) -> list[ScalarAct
             continue
         if not isinstance(item, ScalarActuator):
             raise UnsupportedError(
-                f"'{item.name}' is a {type(item).__name__}, which has no single control"
+                f"'{item.name}' is a {type(item).__name__}, which does not have exactly one control"
             )
         if not (isinstance(item, Muscle) and physiology):
             force = (

@@ -240,9 +240,9 @@ def prepare_motion(
     if lowpass is not None:
         recorded = recorded.lowpassed(lowpass)
     if not (start <= recorded.times[-1] and end >= recorded.times[0]):
-        message = f"no time of the motion lies {format_time_span(start, end)}"
+        message = f"the motion has no row {format_time_span(start, end)}"
         raise SettingError(
-            f"{message}; it is from {recorded.times[0]:g} to {recorded.times[-1]:g} s"
+            f"{message}; its rows go from {recorded.times[0]:g} to {recorded.times[-1]:g} s"
         )
     if start > -np.inf or end < np.inf:
         recorded = recorded.between(start, end)

@@ -39,7 +39,7 @@ def filter_lowpass(
             time.
     """
     if not (math.isfinite(cutoff) and cutoff > 0.0):
-        raise SettingError(f"a low-pass frequency is a positive number of Hz, not {cutoff:g}")
+        raise SettingError(f"a low-pass frequency must be a positive number of Hz, not {cutoff:g}")
     if len(times) < 2:
         raise SettingError("a low-pass filter needs a motion of two rows or more")
     # OpenSim extends by half the rows (Storage::pad), which hides the filter's start-up at the

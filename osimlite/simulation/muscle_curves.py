@@ -196,7 +196,7 @@ def muscle_curves(
     indices = [mechanism.coordinate_index(name) for name in values]
     # A name and a path may mean the same coordinate.
     if len(set(indices)) < len(indices):
-        raise SettingError(f"{join_words(values)} are one coordinate; leave one out")
+        raise SettingError(f"{join_words(values)} are names of the same coordinate; leave one out")
     forces = force_elements(
         model, mechanism, skip_unsupported=True, wrapping=wrapping, folder=folder
     )

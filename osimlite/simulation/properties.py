@@ -66,7 +66,7 @@ class PropertyPath:
         except (AttributeError, LookupError, TypeError):
             words = "/".join(str(step) for step in self.steps)
             raise SettingError(
-                f"'{self.component}' has no number '{words}' in every model of the sweep"
+                f"'{self.component}' lacks the number '{words}' in some models of the sweep"
             ) from None
 
 

@@ -202,8 +202,9 @@ class Simulation:
         # A warning instead of an error: OpenSim accepts any accuracy below 1.
         if fixed_step is None and options.accuracy > LOOSEST_SOUND_ACCURACY:
             warn_caller(
-                f"an accuracy of {options.accuracy:g} is so loose that a motion may end far from the model's own; "
-                f"take {LOOSEST_SOUND_ACCURACY:g} or less"
+                f"an accuracy of {options.accuracy:g} is so loose that the computed motion may differ greatly "
+                "from the exact one; "
+                f"use {LOOSEST_SOUND_ACCURACY:g} or less"
             )
         if options.show and fixed_step is None:
             raise SettingError("showing the motion needs a fixed step, for instance 0.001 s")

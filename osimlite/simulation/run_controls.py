@@ -113,8 +113,9 @@ def add_controls(
             functions[path_of_name[key]] = _make_function(key, value)
     if begin > start + PRINTED_TIME_TOLERANCE_S or end < to - PRINTED_TIME_TOLERANCE_S:
         warn_caller(
-            f"the {description} are given from {max(begin, start):g} to {min(end, to):g} s of a motion from {start:g} to "
-            f"{to:g} s; their first and last values hold before and after"
+            f"the {description} cover only {max(begin, start):g} to {min(end, to):g} s of the motion, which "
+            f"goes from {start:g} to "
+            f"{to:g} s; outside, the first and last values are used"
         )
     return controls.add_functions(functions)
 
@@ -177,8 +178,8 @@ def require_table_span(controls: Controls, start: float, to: float) -> None:
         column = function.function if isinstance(function, ScaledFunction) else function
         if isinstance(column, TableColumn) and not column.x[0] <= start < to <= column.x[-1]:
             raise SimulationError(
-                f"the table of '{column.source}' goes from {column.x[0]:g} to {column.x[-1]:g} s, and the motion from "
-                f"{start:g} to {to:g} s; OpenSim stops outside of the table, so extend it"
+                f"the table of '{column.source}' goes from {column.x[0]:g} to {column.x[-1]:g} s, but the motion from "
+                f"{start:g} to {to:g} s; OpenSim fails outside the table, so extend the table"
             )
 
 
@@ -248,7 +249,7 @@ def _interpolate_linearly(
     y = np.asarray(values, dtype=float)
     if x.ndim != 1 or x.shape != y.shape or not len(x):
         raise SettingError(
-            f"the control of '{name}' has {x.size} times and {y.size} values; give as many of both"
+            f"the control of '{name}' has {x.size} times, but {y.size} values; give one value for each time"
         )
     if not (np.isfinite(x).all() and np.isfinite(y).all() and (np.diff(x) > 0.0).all()):
         raise SettingError(

@@ -81,6 +81,6 @@ class SharedForces:
         worst = failed[np.argmax(np.abs(self.lacking[failed]).max(axis=1))]
         counts = f"{len(failed)} of {format_count(len(self.times), 'time')}"
         return (
-            f"no solution at {counts} (the first is {self.times[failed[0]]:g} s), where the tables have NaN; "
-            f"at {self.times[worst]:g} s the actuators lack {self.describe_missing_force(worst)}"
+            f"no solution at {counts} (first at {self.times[failed[0]]:g} s); the tables have NaN there; "
+            f"at {self.times[worst]:g} s the actuators are too weak by {self.describe_missing_force(worst)}"
         )

@@ -141,7 +141,7 @@ class StaticOptimization:
                 )
             if not (low < np.inf and high > -np.inf):
                 raise ModelError(
-                    f"'{item.name}' has controls from {low:g} to {high:g} only; give it a finite one"
+                    f"'{item.name}' has only infinite controls, from {low:g} to {high:g}; set a finite min_control or max_control"
                 )
 
     @cached_property
@@ -496,7 +496,8 @@ class StaticOptimization:
                 if index not in self._free_indices
             ]
             raise UnsupportedError(
-                f"{join_words(names)} can move while all other coordinates rest; lock or couple them"
+                f"constraints do not determine {join_words(names)}: these coordinates can move while all "
+                "others rest; lock or couple them"
             )
         # A particular solution of G udot = target, to which motions of the null space are added.
         start = np.linalg.pinv(equations) @ targets

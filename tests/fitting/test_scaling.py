@@ -168,7 +168,8 @@ def test_what_cannot_be_scaled_is_told() -> None:
     with pytest.raises(SettingError, match="no body 'tigh'; did you mean 'thigh'"):
         osimlite.scale(model, factors={"tigh": 1.2})
     with pytest.raises(
-        SettingError, match="measurement 'thigh' must have pairs of markers, and by body the axes"
+        SettingError,
+        match="measurement 'thigh' must have pairs of markers, and for each body the axes",
     ):
         osimlite.scale(model, {}, measurements={"thigh": ([("one", "two")], ["thigh"])})  # type: ignore[arg-type]
     with pytest.raises(SettingError, match="need markers of the standing subject"):

@@ -143,7 +143,7 @@ def test_a_result_does_not_wait_for_a_pipe(study: Path, words: tuple[str, ...]) 
 
 def test_a_file_that_the_user_names_may_be_no_waiting_pipe(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
-    with pytest.raises(OsimliteError, match="nobody reads this pipe"):
+    with pytest.raises(OsimliteError, match="no program reads from this pipe"):
         write_atomically(tmp_path / "pipe", "text")
 
 

@@ -372,11 +372,11 @@ def test_loads_that_are_none(kind, given, said, tmp_path):
         ),
         (
             {"output_path": "/bodyset/b1|position", "output_index": 3},
-            "no component output_index 3",
+            "output_index is 3, but the output has no component",
         ),
         (
             {"output_path": "/jointset/j0/q0|value", "output_index": 0},
-            "no component output_index 0",
+            "output_index is 0, but the output has no component",
         ),
         ({"output_path": "/bodyset/b1|position", "exponent": 0}, "exponent is 0"),
         ({"output_path": "/bodyset/b1|position", "operation": "addition"}, "require each other"),

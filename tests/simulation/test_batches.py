@@ -125,9 +125,9 @@ def test_a_run_that_fails_does_not_harm_the_others(engine, starts):
 def test_wrong_words_are_refused(engine, starts):
     with pytest.raises(OsimliteError, match="14 numbers"):
         run_many(engine, starts[:, 1:])
-    with pytest.raises(OsimliteError, match="for each of the 20 runs"):
+    with pytest.raises(OsimliteError, match="expected an array of 20 rows"):
         run_many(engine, starts, numbers=np.zeros((3, 5)))
-    with pytest.raises(OsimliteError, match="'x' is on a coordinate, a body or a contact"):
+    with pytest.raises(OsimliteError, match="'x' must name exactly one of"):
         run_many(engine, starts, watches=[Watch("x")])
     with pytest.raises(OsimliteError, match="locked"):
         run_many(engine, starts, watches=[Watch("x", coordinate="platform_rz")])
@@ -168,12 +168,12 @@ def test_a_touch_ends_a_run(engine, starts):
         ({"accuracy": 2.0}, "between 0 and 1; 2.0"),
         ({"to": float("nan")}, "at 0 s or later, not at nan s"),
         ({"to": -1.0}, "at 0 s or later, not at -1.0 s"),
-        ({"report_times": [0.5, 0.1]}, "do not increase"),
-        ({"report_times": [-0.1]}, "do not increase"),
-        ({"report_times": [float("nan")]}, "do not increase"),
-        ({"threads": -1}, "threads is at least 1, not -1"),
-        ({"most_events": -1}, "most_events is at least 0"),
-        ({"most_tries": -1}, "most_tries is at least 0"),
+        ({"report_times": [0.5, 0.1]}, "must not decrease"),
+        ({"report_times": [-0.1]}, "must not decrease"),
+        ({"report_times": [float("nan")]}, "must not decrease"),
+        ({"threads": -1}, "threads must be at least 1, not -1"),
+        ({"most_events": -1}, "most_events must be at least 0"),
+        ({"most_tries": -1}, "most_tries must be at least 0"),
     ],
 )
 def test_settings_without_meaning_are_refused(engine, starts, settings, why):

@@ -345,7 +345,7 @@ def test_why_there_is_no_step_is_told_late_too():
     for engine in ("compiled", "bullet"):
         with pytest.raises(
             SimulationError,
-            match=r"at t = 5\.5 s: even its shortest step of \d\.?\d*e-1[56] s ends too far from",
+            match=r"at t = 5\.5 s: even a step of \d\.?\d*e-1[56] s, the shortest, ends in a state that violates",
         ) as error:
             osimlite.simulate(model, to=6.0, engine=engine)
         messages.append(str(error.value))

@@ -342,7 +342,7 @@ def test_an_unknown_constraint_is_refused_by_name():
         name = "/constraintset/strange"
 
     with pytest.raises(
-        UnsupportedError, match=r"'/constraintset/strange' \(Strange\) cannot be kept up"
+        UnsupportedError, match=r"'/constraintset/strange' \(Strange\) cannot be enforced"
     ):
         CompiledEngine(replace(mechanism, constraints=(Strange(),)), Forces(()))
 

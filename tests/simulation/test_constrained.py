@@ -98,7 +98,7 @@ def test_an_inertia_that_bullet_refuses_takes_no_other_route():
 def test_routes_that_are_none_are_refused():
     mechanism = knee(opensim_derivatives=False)
     with pytest.raises(
-        UnsupportedError, match=r"articulated-body is for models .* take mass-matrix for 'knee'"
+        UnsupportedError, match=r"articulated-body needs a model .* use mass-matrix for 'knee'"
     ):
         accelerations(mechanism, np.zeros(4), np.zeros(4), route="articulated-body")
 
@@ -205,10 +205,11 @@ def test_what_is_set_stays_and_the_rest_follows():
 
 def test_starts_that_contradict_the_constraints_are_refused():
     with pytest.raises(
-        SimulationError, match="no pose of 'pins' near the given one fulfils /constraintset/loop"
+        SimulationError,
+        match="no pose of 'pins' near the requested pose fulfils /constraintset/loop",
     ):
         simulate(four_bars(), 0.01, initial={"p0": 1.5, "p1": 1.5, "p2": 1.5})
-    with pytest.raises(SimulationError, match="do not allow the speeds given for p0 and p1"):
+    with pytest.raises(SimulationError, match="do not allow the requested speeds of p0 and p1"):
         simulate(four_bars(), 0.01, initial_speeds={"p0": 1.0, "p1": 5.0})
 
 

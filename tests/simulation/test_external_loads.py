@@ -79,10 +79,10 @@ def test_the_same_as_a_prescribed_force(model, tmp_path):
         ),
         (
             {"force_identifier": "grf_"},
-            "exactly three columns must begin with it, and .* has grf_vx, grf_vy",
+            "exactly three column labels must begin with this text, but in .* these do: grf_vx, grf_vy",
         ),
         ({"force_identifier": ""}, "has no force_identifier and no torque_identifier"),
-        ({"force_identifier": "", "torque_identifier": "grf_m"}, "leave it out"),
+        ({"force_identifier": "", "torque_identifier": "grf_m"}, "leave out the point_identifier"),
         ({"force_identifer": "grf_v"}, "<force_identifer> is unknown"),
     ],
 )

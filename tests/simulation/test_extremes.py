@@ -79,15 +79,15 @@ def test_both_engines_refuse_an_inertia_that_no_body_has(joint, body, words):
             "translation",
             (float("inf"), 0, 0),
             ModelError,
-            "has a place or turning that is not finite",
+            "has a position or orientation that is not finite",
         ),
         (
             "orientation",
             (0, float("nan"), 0),
             ModelError,
-            "has a place or turning that is not finite",
+            "has a position or orientation that is not finite",
         ),
-        ("translation", (1e308, 1e308, 0), SimulationError, "the places of the frames"),
+        ("translation", (1e308, 1e308, 0), SimulationError, "the positions of the frames"),
     ],
 )
 @pytest.mark.parametrize("engine", ["bullet", "compiled"])

@@ -111,7 +111,7 @@ SPRING: dict[str, Any] = {"resting_length": 0.1, "stiffness": 1.0, "dissipation"
         ),
         (
             by_body,
-            r"'/forceset/a' \(BodyActuator driven by '/controllerset/c', which has one control for its 6\)",
+            r"'/forceset/a' \(BodyActuator driven by '/controllerset/c', which sets only one of its 6 controls\)",
         ),
     ],
 )

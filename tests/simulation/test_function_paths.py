@@ -40,13 +40,16 @@ def spring(moment_arm_functions=(), **properties):
         ),
         (
             {"coordinate_paths": TWO, "length_function": Sine()},
-            "function of 1 variables and gets 2",
+            "function of 1 variables, but 2 coordinates",
         ),
         (TWICE, "name each once"),
-        ({"coordinate_paths": ONE, "length_function": Constant(value=1.0)}, "no arguments"),
+        (
+            {"coordinate_paths": ONE, "length_function": Constant(value=1.0)},
+            "cannot depend on coordinates",
+        ),
         (
             {"coordinate_paths": ONE, "length_function": MultiplierFunction(function=Constant())},
-            "no arguments",
+            "cannot depend on coordinates",
         ),
         (
             {"coordinate_paths": TWO, "length_function": PLANE, "moment_arm_functions": [PLANE]},
@@ -58,14 +61,14 @@ def spring(moment_arm_functions=(), **properties):
                 "length_function": PLANE,
                 "lengthening_speed_function": PLANE,
             },
-            "'lengthening_speed_function' of .* gets 4",
+            "'lengthening_speed_function' of .* but 4 coordinates",
         ),
         (
             {
                 "coordinate_paths": TWO,
                 "length_function": ExpressionBasedFunction(expression="q", variables=("q",)),
             },
-            "has 1 variables and gets 2",
+            "has 1 variables, but is called with 2",
         ),
         (
             {

@@ -95,7 +95,7 @@ def test_only_a_part_of_the_motion() -> None:
     assert part.rows == pytest.approx(whole.rows[10:26], abs=1e-9)
     for what in (osimlite.kinematics, osimlite.inverse_dynamics):
         with pytest.raises(
-            SettingError, match="no time of the motion lies between 3 and 4 s; it is from 0 to 1 s"
+            SettingError, match="the motion has no row between 3 and 4 s; its rows go from 0 to 1 s"
         ):
             what(model, {"y": up}, times=TIMES, start=3.0, end=4.0)
 
@@ -136,11 +136,11 @@ def test_loads_without_a_document(tmp_path: Path) -> None:
         (None, columns, "pass the table as `external_loads`"),
         (plate, {"bok": [("f1_",)]}, "did you mean 'box'"),
         (plate, {"box": [("g1_",)]}, "the force_identifier of 'box' is 'g1_'"),
-        (plate, {"box": [()]}, "name the beginnings of the labels of its force"),
+        (plate, {"box": [()]}, "expected one to three prefixes of column labels"),
         (
             plate,
             {"box": [("f1_", "p1_", "m1_", "q1_")]},
-            "name the beginnings of the labels of its force",
+            "expected one to three prefixes of column labels",
         ),
     ]
     for file, applied, said in wrong:

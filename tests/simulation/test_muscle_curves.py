@@ -61,7 +61,7 @@ def test_notebooks_show_what_is_least_and_greatest():
         (
             {"x": [0.3], "/jointset/slide/x": [0.3]},
             (),
-            "x and /jointset/slide/x are one coordinate",
+            "x and /jointset/slide/x are names of the same coordinate",
         ),
         ({"x": [0.3]}, ("/forceset/mo",), "did you mean '/forceset/mu'"),
     ],

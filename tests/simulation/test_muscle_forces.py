@@ -79,8 +79,8 @@ def test_one_actuator_bounds_and_forces_from_files(tmp_path: Path) -> None:
     # Two newtons are the limit of the reserve.
     assert other.columns == ("reserve",)
     assert not other.solved.any() and np.isnan(other.rows).all()
-    assert "no solution at 51 of 51 times (the first is 0 s)" in (said := other.describe_unsolved())
-    assert "the actuators lack 19.61 N at y" in said
+    assert "no solution at 51 of 51 times (first at 0 s)" in (said := other.describe_unsolved())
+    assert "the actuators are too weak by 19.61 N at y" in said
     with pytest.warns(DeprecatedWarning, match="use describe_unsolved"):
         assert other.unsolved() == said
     off = lift(30.0, 10.0)
@@ -113,9 +113,9 @@ def test_files_have_the_names_of_the_analysis(tmp_path: Path) -> None:
         ),
         (lift(1.0), {"exponent": np.nan}, SettingError, "an exponent of nan"),
         (lift(1.0), {"muscles": "strong"}, SettingError, "unknown muscle force 'strong'"),
-        (lift(1.0), {"start": 3.0}, SettingError, "no time of the motion"),
+        (lift(1.0), {"start": 3.0}, SettingError, "the motion has no row"),
         (lift(1.0), {"forces": ["nothing.xml"]}, OsimliteError, "nothing.xml"),
-        (bounded(np.inf, np.inf), {}, ModelError, "controls from inf to inf only"),
+        (bounded(np.inf, np.inf), {}, ModelError, "only infinite controls, from inf to inf"),
         (bounded(1.0, 0.0), {}, ModelError, "a min_control of 1 above its max_control of 0"),
         (lift(1.0), {"applied_to": {"body": [["f_"]]}}, SettingError, "pass the table"),
     ],
@@ -131,7 +131,7 @@ def test_what_has_no_single_control_is_refused() -> None:
     model = lift(1.0)
     model.add(osimlite.BodyActuator(name="push", socket_body=model.body_set.objects[0]))
     with pytest.raises(
-        UnsupportedError, match="'push' is a BodyActuator, which has no single control"
+        UnsupportedError, match="'push' is a BodyActuator, which does not have exactly one control"
     ):
         osimlite.static_optimization(model, {"y": UP}, times=TIMES)
 

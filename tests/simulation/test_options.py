@@ -50,7 +50,7 @@ def test_every_option_is_described():
 def test_an_accuracy_that_promises_nothing_is_told(integrator):
     simulation = Simulation(damped(), "compiled")
     with pytest.warns(
-        DoubtfulWarning, match=r"an accuracy of 0\.1 is so loose .* take 0\.01 or less"
+        DoubtfulWarning, match=r"an accuracy of 0\.1 is so loose .* use 0\.01 or less"
     ):
         simulation.run(0.1, accuracy=0.1, integrator=integrator)
     simulation.run(0.1, accuracy=0.01, integrator=integrator)

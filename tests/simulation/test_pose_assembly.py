@@ -145,7 +145,8 @@ def test_loops(fixtures) -> None:
     assert np.abs(motion.values - [mechanism.assemble(q) for q in wanted]).max() < 1e-8
     model["/constraintset/end"].location_body_1 = (9.0, 0.0, 0.0)
     with pytest.raises(
-        SimulationError, match="no pose of 'loop' near the given one fulfils /constraintset/end"
+        SimulationError,
+        match="no pose of 'loop' near the requested pose fulfils /constraintset/end",
     ):
         assemble_motion(build_mechanism(model), np.zeros(20), wanted)
 

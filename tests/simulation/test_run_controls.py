@@ -160,11 +160,11 @@ def test_the_kernel_alone(model, code):
         ),
         (
             {"second": ([0.0, 1.0], [1.0])},
-            "the control of 'second' has 2 times and 1 values; give as many of both",
+            "the control of 'second' has 2 times, but 1 values; give one value for each time",
         ),
         (
             {"second": ([], [])},
-            "the control of 'second' has 0 times and 0 values; give as many of both",
+            "the control of 'second' has 0 times, but 0 values; give one value for each time",
         ),
         (
             {"second": ([0.0, 0.0], [1.0, 2.0])},
@@ -198,7 +198,7 @@ def test_names_that_two_actuators_share(model):
 
 
 def test_tables_that_do_not_cover_the_motion(ready):
-    message = "the controls are given from 0.1 to 0.2 s of a motion from 0 to 0.3 s; their first and last values hold"
+    message = "the controls cover only 0.1 to 0.2 s of the motion, which goes from 0 to 0.3 s; outside, the first and last values"
     with pytest.warns(DoubtfulWarning, match=message):
         times, result = controls_of(
             ready, {"second": ((0.1, 0.2), (1.0, 2.0)), "first": ((0.0, 0.3), (0.0, 0.0))}
@@ -221,8 +221,8 @@ def test_a_table_source_that_does_not_cover_the_motion(model, tmp_path):
     )
     osimlite.simulate(fed, to=0.2, engine="compiled", folder=tmp_path)
     message = (
-        "the table of '/table' goes from 0 to 0.2 s, and the motion from 0 to 0.3 s; "
-        "OpenSim stops outside of the table, so extend it"
+        "the table of '/table' goes from 0 to 0.2 s, but the motion from 0 to 0.3 s; "
+        "OpenSim fails outside the table, so extend the table"
     )
     with pytest.raises(SimulationError, match=message):
         osimlite.simulate(fed, to=0.3, engine="compiled", folder=tmp_path)

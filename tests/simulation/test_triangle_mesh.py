@@ -101,7 +101,7 @@ def test_what_is_refused(tmp_path):
         TriangleMesh.read("mesh.ply", MeshFolders(tmp_path))
     points, faces = block((1.0, 1.0, 1.0))
     WRITERS[".obj"](tmp_path / "open.obj", points, faces[1:])
-    with pytest.raises(ModelError, match="is not a closed surface: 6 edges") as caught:
+    with pytest.raises(ModelError, match="is not a closed surface: at 6 edges") as caught:
         TriangleMesh.read("open.obj", MeshFolders(tmp_path))
     assert caught.value.file == str(tmp_path / "open.obj")
     WRITERS[".obj"](tmp_path / "flat.obj", points * (1.0, 1.0, 0.0), faces)

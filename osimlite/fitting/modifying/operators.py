@@ -384,5 +384,5 @@ def apply_operators(
         if operation is None:
             name = getattr(operator, "class_name", "") or type(operator).__name__
             known_names = ", ".join(cls.__name__ for cls in OPERATIONS)
-            raise UnsupportedError(f"osimlite cannot apply a {name}; it has {known_names}")
+            raise UnsupportedError(f"osimlite cannot apply a {name}; it supports {known_names}")
         operation(model, operator, Path(folder))

@@ -163,7 +163,7 @@ def read_version(source: Source, root: etree._Element) -> int:
             VersionError, f'<OpenSimDocument> {result}; write Version="{CURRENT_VERSION}"', position
         )
     message = (
-        f"document version {number} is none that OpenSim ever wrote (they begin at {OLDEST_VERSION}); "
+        f"OpenSim never wrote document version {number} (the oldest is {OLDEST_VERSION}); "
         f'write Version="{CURRENT_VERSION}" if the model is in the current format'
     )
     raise make_version_error(source, number, message)

@@ -123,7 +123,7 @@ def _load_declarations(files: tuple[tuple[str, int | None], ...]) -> Mapping[str
         ) as error:
             # The file has data of unexpected types; the types that are often confused have messages
             # of their own.
-            raise OsimliteError(f"its classes cannot be made: {error}", file=path) from None
+            raise OsimliteError(f"cannot create its classes: {error}", file=path) from None
     return result
 
 
@@ -163,7 +163,7 @@ class _Declarations:
             rule = entry.get("resolution")
             if not isinstance(rule, str) or rule not in RULES:
                 raise self.make_error(
-                    f"there is no resolution '{rule}'{suggest_or_list(str(rule), RULES)}",
+                    f"unknown resolution '{rule}'{suggest_or_list(str(rule), RULES)}",
                     "references",
                     str(rule),
                 )
@@ -194,11 +194,12 @@ class _Declarations:
                 raise self.make_error(f"'{name}' is a class of OpenSim itself", name)
             if len(self.pending) > MAX_INHERITANCE_DEPTH:
                 raise self.make_error(
-                    f"more than {MAX_INHERITANCE_DEPTH} classes derive from each other", name
+                    f"the chain of base classes is longer than {MAX_INHERITANCE_DEPTH}", name
                 )
             if name in self.pending:
                 raise self.make_error(
-                    f"{join_words(self.pending)} derive from each other, or hold each other", name
+                    f"{join_words(self.pending)} form a circle: each derives from the next one, or contains it",
+                    name,
                 )
             # The list also shows the chain of names in the error.
             # A class that refers to itself while it is being made is found by this list.
@@ -329,7 +330,7 @@ class _Declarations:
         if type_name in _VECTORS:
             if shape == "list":
                 raise self.make_error(
-                    f"a list of {type_name} is read by no class of OpenSim", owner, name
+                    f"no class of OpenSim reads a list of {type_name}", owner, name
                 )
             vector = cast("Any", type_name.replace("Vector", "vector"))
             kind = Value(

@@ -290,8 +290,8 @@ def require_stated_version(source: Source) -> None:
     # Positions are found by the index of an element, which counts elements only.
     number = [*root.iter(etree.Element)].index(newer.element)
     message = (
-        f"the document says version {version} and holds <{decode_name(newer.element.tag)}> in "
-        f"<{newer.parent}>, which came with version {newer.since}: one of them is wrong; write "
+        f"the document has version {version}, but <{decode_name(newer.element.tag)}> in "
+        f"<{newer.parent}> exists only since version {newer.since}; write "
         f'Version="{CURRENT_VERSION}" if the model is in the current format'
     )
     raise make_version_error(source, version, message, number)
@@ -359,7 +359,8 @@ def _check_leftovers(source: Source, version: int, notes: list[Note]) -> None:
         return
     tags = ", ".join(f"<{tag}>" for tag in sorted({note.word for note in unknown_notes})[:8])
     message = (
-        f"document version {version} is older than {FIRST_COMPLETE_VERSION}, and no rule says what becomes of {tags}: that would "
+        f"document version {version} is older than {FIRST_COMPLETE_VERSION}, and osimlite cannot convert "
+        f"{tags} of such documents, which would "
         "be lost; remove it, or open and save the model with OpenSim 2"
     )
     raise make_version_error(source, version, message, unknown_notes[0].number)

@@ -88,14 +88,14 @@ def read_repaired(
     mark = _MARK.search(source.text)
     if mark is not None:
         advice = (
-            f"'{mark[0].rstrip()[:40]}' is a mark it left; keep one side and take the marks out"
+            f"'{mark[0].rstrip()[:40]}' is a mark of the merge; keep one side and delete the marks"
         )
         raise source.fault(
             NotWellFormedError, f"an unfinished merge: {advice}", source.position(mark.start())
         )
     unended = _find_unclosed(source.text)
     if unended is not None:
-        message = "not well-formed XML: what begins here with '<!' has no end"
+        message = "not well-formed XML: the markup that begins here with '<!' is not closed"
         raise source.fault(NotWellFormedError, message, source.position(unended))
     check_doctype(source)
     # 2. Repair, and parse again.

@@ -31,16 +31,16 @@ _PLAIN = (
         "something follows after the root element has ended",
     ),
     (r"Specification mandates value for attribute (\S+)", r"the attribute \1 has no value"),
-    (r"AttValue: \" or ' expected", "the value of an attribute stands in quotes"),
+    (r"AttValue: \" or ' expected", "the value of an attribute must be in quotes"),
     (r"AttValue: ' expected", "the value of an attribute has no closing quote"),
     (
         r"Unescaped '<' not allowed in attributes values",
-        "no '<' may stand in an attribute, nor a quote be left out",
+        "an attribute contains '<' or has no closing quote; write &lt; for the character '<'",
     ),
-    (r"attributes construct error", "blanks belong between attributes"),
+    (r"attributes construct error", "attributes must be separated by spaces"),
     (
         r"(?:PCDATA i|I|xmlParse\w+: i)nvalid (?:xml)?Char(?: value)? (\d+).*",
-        r"no character of number \1 may stand in XML",
+        r"XML does not allow character number \1",
     ),
 )
 

@@ -121,7 +121,7 @@ def _run_reader(path: str | Path, content_type: str) -> dict[str, Array]:
         )
     except subprocess.TimeoutExpired:
         raise DocumentError(
-            "the file cannot be read: reading it does not end", file=str(path)
+            "the file cannot be read: the reader does not finish", file=str(path)
         ) from None
     except OSError as error:
         raise DocumentError(

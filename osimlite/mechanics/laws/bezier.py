@@ -107,10 +107,12 @@ def _make_section(first: Point, last: Point, curviness: float) -> Numbers:
     # The corner must be nearer to both ends than these are to each other, else the curve would bend
     # back.
     if not max(hypot(x - x0, y - y0), hypot(x - x1, y - y1)) < hypot(x1 - x0, y1 - y0):
-        raise ValueError(f"its slopes at {x0:g} and {x1:g} make no corner between these")
+        raise ValueError(
+            f"its tangents at {x0:g} and {x1:g} intersect too far away from the curve section"
+        )
     # Beside the section, the corner makes x(u) fall first. OpenSim then cannot invert x(u).
     if not x0 <= x <= x1:
-        raise ValueError(f"its slopes at {x0:g} and {x1:g} meet beside the part between these")
+        raise ValueError(f"its tangents at {x0:g} and {x1:g} do not intersect between these values")
     # OpenSim maps curviness 0 to 1 onto 0.1 to 0.9, so that x(u) stays strictly increasing.
     c = 0.1 + 0.8 * curviness
     _, *of_x = _section_coefficients(x0, x0 + c * (x - x0), x1 + c * (x - x1), x1)

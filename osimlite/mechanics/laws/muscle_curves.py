@@ -323,6 +323,6 @@ def _complete_properties(
     result = [x for x in values if x is not None]
     _require_condition(
         len(result) in (0, len(defaults)),
-        f"its {first_name} and what follows it are neither all given nor all left out",
+        f"its {first_name} and the optional properties after it must be either all given or all left out",
     )
     return tuple(result) or defaults

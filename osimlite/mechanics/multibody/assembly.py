@@ -50,7 +50,7 @@ class UnmetConstraintsError(SimulationError):
     def __init__(self, model: str, errors: Mapping[str, float]) -> None:
         self.errors = dict(errors)
         super().__init__(
-            f"no pose of '{model}' near the given one fulfils {join_words([*self.errors])}; change the "
+            f"no pose of '{model}' near the requested pose fulfils {join_words([*self.errors])}; change the "
             "coordinate values, unlock or unclamp coordinates, or set isEnforced of a constraint "
             "to false"
         )
@@ -149,7 +149,7 @@ def project_speeds(state: MechanismKinematics, kept: Collection[int] = ()) -> Ar
     ):
         names = [state.mechanism.coordinates[index].name for index in kept]
         raise SimulationError(
-            f"the constraints of '{state.mechanism.name}' do not allow the speeds given for {join_words(names)}; "
+            f"the constraints of '{state.mechanism.name}' do not allow the requested speeds of {join_words(names)}; "
             "leave some of them out"
         )
     return u

@@ -111,7 +111,7 @@ def constraint_record(
         case b.WeldEquations():
             return _record_between_bodies(_make_weld_equations(constraint, link_map))
     raise UnsupportedError(
-        f"'{constraint.name}' ({type(constraint).__name__}) cannot be kept up; set its isEnforced to false"
+        f"'{constraint.name}' ({type(constraint).__name__}) cannot be enforced; set its isEnforced to false"
     )
 
 

@@ -207,7 +207,7 @@ def require_numbers(mechanism: Mechanism, *arrays: Array) -> None:
     if not all((np.abs(array) < MAX_NUMBER).all() for array in arrays):
         raise SimulationError(
             f"the equations of motion of '{mechanism.name}' are not finite; check the coordinate values and speeds, "
-            "the applied forces, the masses and inertias of the bodies and the places of the frames"
+            "the applied forces, the masses and inertias of the bodies and the positions of the frames"
         )
 
 

@@ -89,8 +89,8 @@ class ConstraintReader:
         if path not in self.coordinates:
             # If a coordinate occurs several times in a joint, only the first one moves the joint.
             raise ModelError(
-                f"the {field} of '{self.placements.path(owner)}' is '{path}', which moves nothing; "
-                "give it a coordinate that a joint moves by"
+                f"the {field} of '{self.placements.path(owner)}' is '{path}', which moves no joint; "
+                "name a coordinate that moves a joint"
             )
         return self.coordinates[path]
 
@@ -210,7 +210,7 @@ def unknown_constraint(path: str, class_name: str) -> UnsupportedError:
     """
     return UnsupportedError(
         f"the constraint '{path}' ({class_name}) cannot be computed; set its isEnforced to false or remove it; "
-        f"those osimlite computes are {join_words([item.__name__ for item in _READERS], max_count=len(_READERS))}"
+        f"osimlite supports {join_words([item.__name__ for item in _READERS], max_count=len(_READERS))}"
     )
 
 

@@ -60,7 +60,8 @@ class Placements:
                 del waiting[path]
             elif (parent_path := self.path(parent_frame)) in waiting:
                 raise ModelError(
-                    f"the frame '{parent_path}' is fixed to itself, through {join_words(waiting)}; fix it to a body"
+                    f"the frame '{parent_path}' is fixed to itself, through {join_words(waiting)}; attach one "
+                    "of these frames to a body"
                 )
             else:
                 waiting[parent_path] = parent_frame
@@ -93,13 +94,13 @@ class Placements:
             base, matrix = self.resolve_frame(self.follow_socket(frame, "socket_parent"))
             if not np.isfinite((*frame.translation, *frame.orientation)).all():
                 raise ModelError(
-                    f"the frame '{path}' has a place or turning that is not finite; give numbers"
+                    f"the frame '{path}' has a position or orientation that is not finite; give finite numbers"
                 )
             return base, matrix @ make_offset(frame.translation, frame.orientation)
         if isinstance(frame, StationDefinedFrame):
             return self._fit_frame_to_stations(frame, path)
         raise UnsupportedError(
-            f"the frame '{path}' is a {type(frame).__name__}, which osimlite cannot place"
+            f"the frame '{path}' is a {type(frame).__name__}, a class that osimlite does not support"
         )
 
     def follow_socket(self, owner: Component, socket: str) -> PhysicalFrame:
@@ -117,7 +118,7 @@ class Placements:
             class_name = getattr(target, "class_name", "") or type(target).__name__
             raise UnsupportedError(
                 f"'{self.path(owner)}': {socket} names '{self.path(target)}', a {class_name}, "
-                "which osimlite cannot place; name a body or a PhysicalOffsetFrame"
+                "a class of frames that osimlite does not support here; name a body or a PhysicalOffsetFrame"
             )
         return target
 

@@ -74,7 +74,7 @@ def convert_function(
             supported += _UNIVARIATE
             raise UnsupportedError(
                 f"{where} is a {name}, which osimlite cannot differentiate twice; "
-                f"the functions it can are {join_words(supported, max_count=len(supported))}"
+                f"the supported functions are {join_words(supported, max_count=len(supported))}"
             )
         _require_argument_count(function, 1, arguments)
         return _UNIVARIATE[class_name](function)
@@ -89,7 +89,7 @@ class _Impossible(Exception):
 def _require_argument_count(function: Object, expected: int, count: int) -> None:
     if count != expected:
         raise _Impossible(
-            f"it is a function of {expected} variables and gets {count}; list as many coordinates"
+            f"it is a function of {expected} variables, but {count} coordinates are listed; list {expected}"
         )
 
 
@@ -173,7 +173,9 @@ def _convert_step(function: StepFunction) -> f.SmoothFunction:
         # OpenSim follows the same curve from its other end.
         return f.QuinticStep(end, start, function.end_value, function.start_value)
     if not start < end:
-        raise _Impossible(f"its transition ends where it starts, at {end:g}; let it end elsewhere")
+        raise _Impossible(
+            f"its transition starts and ends at {end:g}; set different times for its start and end"
+        )
     return f.QuinticStep(start, end, function.start_value, function.end_value)
 
 

@@ -89,7 +89,7 @@ def joint_motions(
     needed = 1 + max((index for motion in motions for index in motion.coordinates), default=-1)
     if len(coordinates) != needed:
         raise ModelError(
-            f"{class_name} '{path}' has {len(coordinates)} coordinates and needs {needed}"
+            f"{class_name} '{path}' has {len(coordinates)} coordinates, but needs {needed}"
         )
     return motions, coordinates
 
@@ -102,7 +102,7 @@ def unknown_joint(path: str, class_name: str) -> UnsupportedError:
         class_name: name of its class.
     """
     return UnsupportedError(
-        f"'{path}' is a {class_name}, whose motion osimlite cannot compute; the joints it can are "
+        f"'{path}' is a {class_name}, a class of joints that osimlite does not support; it supports "
         f"{join_words(JOINT_TYPES, max_count=len(JOINT_TYPES))}"
     )
 
@@ -132,7 +132,7 @@ def _build_custom_motions(
         for word in words:
             if word not in coordinates:
                 raise ModelError(
-                    f"{where} names the coordinate '{word}', which the joint does not have; add it there"
+                    f"{where} names the coordinate '{word}', which the joint does not have; add it to the joint"
                 )
             # OpenSim sorts the coordinates by their first appearance here, whatever their order in
             # the file.
@@ -150,7 +150,7 @@ def _build_custom_motions(
     unused = [name for name in coordinates if name not in order]
     if unused:
         raise ModelError(
-            f"CustomJoint '{path}' has {len(coordinates)} coordinates and needs {len(order)}: "
+            f"CustomJoint '{path}' has {len(coordinates)} coordinates, but uses only {len(order)}: "
             f"nothing in its SpatialTransform depends on {join_words(unused)}"
         )
     motions = make_custom_motions(axes[:3], axes[3:], opensim_derivatives=opensim_derivatives)

@@ -108,7 +108,7 @@ class MechanismStructure:
             same_named = [info.path for info in self.coordinates if info.name == name]
             if same_named:
                 raise ModelError(
-                    f"'{self.name}' has several coordinates '{name}'; name it {' or '.join(same_named)}"
+                    f"'{self.name}' has several coordinates '{name}'; write {' or '.join(same_named)}"
                 ) from None
             names = self.coordinate_names
             name_list = join_words(names, max_count=MAX_NAMED_COORDINATES)

@@ -164,7 +164,9 @@ def build_output_formula(
             owner, "output_path and second_output_path have different types"
         )
     if not -1 <= index < max(sizes) or (index >= 0 and max(sizes) == 1):
-        raise problem.invalid_error(owner, f"the output has no component output_index {index}")
+        raise problem.invalid_error(
+            owner, f"output_index is {index}, but the output has no component of this index"
+        )
 
     def value(point: PointSymbols) -> Formula:
         """Return the number that the property `operation` makes of the outputs at a point."""

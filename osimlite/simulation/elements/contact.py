@@ -341,7 +341,7 @@ class HuntCrossley(PairContact):
         early_return = builder.early_return and len(pairs) > 1
         if early_return and any(surface.radii for surface in surfaces):
             raise builder.make_unsupported_error(
-                force, " with an ellipsoid, and Simbody's early return"
+                force, " with an ellipsoid and the option simbody_early_return"
             )
         path = builder.path(force)
         vt = force.transition_velocity

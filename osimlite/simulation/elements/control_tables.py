@@ -98,7 +98,7 @@ def make_column_function(table: StoTable, index: int, degree: int, what: str) ->
         return PiecewiseConstant(tuple(times.tolist()), tuple(values.tolist()))
     if not 1 <= half_order <= 4 or len(times) < 2 * half_order:
         raise ModelError(
-            f"{what} is {degree}, which {len(times)} rows do not allow; use 0 for steps or 1 for straight lines",
+            f"{what} is {degree}, which is impossible with {len(times)} rows; use 0 for steps or 1 for straight lines",
             file=table.file,
         )
     return smoothing_spline(times, values, half_order, 0.0)

@@ -116,5 +116,5 @@ def refuse_proportional_control(
 ) -> Iterator[Drive]:
     """Yield the error that osimlite does not compute this controller."""
     actuator = builder.resolve_target(controller, "socket_actuator", controller.socket_actuator)
-    why = f" driven by the ToyPropMyoController '{builder.path(controller)}', which follows an activation"
+    why = f" driven by the ToyPropMyoController '{builder.path(controller)}', whose control follows an activation"
     yield Drive(actuator, builder.make_unsupported_error(actuator, why))

@@ -142,7 +142,7 @@ class ModelControls:
             path = builder.path(actuator)
             if number is None and actuator.control_count > 1:
                 # OpenSim 4.6 reads the other controls from the memory behind the first.
-                why = f" driven by '{builder.path(controller)}', which has one control for its {actuator.control_count}"
+                why = f" driven by '{builder.path(controller)}', which sets only one of its {actuator.control_count} controls"
                 signal = builder.make_unsupported_error(actuator, why)
             if isinstance(signal, UnsupportedError):
                 # The error is raised only if the actuator is computed: one that is off needs no

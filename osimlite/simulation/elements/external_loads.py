@@ -78,8 +78,11 @@ def build_external_loads(
     for body, several in applied_to.items():
         for number, names in enumerate(several, start=1):
             if not 1 <= len(names) <= len(PARTS) or not names[0]:
-                message = f"the load on '{body}' is {list(names)}; name the beginnings of the labels of its force"
-                raise SettingError(f"{message}, then of its point, then of its moment")
+                message = (
+                    f"the load on '{body}' is {list(names)}; expected one to three prefixes of column labels: "
+                    "that of the force"
+                )
+                raise SettingError(f"{message}, then that of the point, then that of the moment")
             identifiers: Any = {
                 f"{part}_identifier": text for part, text in zip(PARTS, names, strict=False)
             }
@@ -154,7 +157,7 @@ def read_load_of_model(builder: ElementBuilder, force: ExternalForce) -> Load:
     loads: Any = builder.tree.parent_of(force)
     if not isinstance(loads, ExternalLoads):
         raise builder.make_unsupported_error(
-            force, " outside of ExternalLoads, so that it has no data file"
+            force, " outside of ExternalLoads, and therefore without a data file"
         )
     columns = _Columns(read_loads_table(loads, builder.folder, builder.path(loads)), [force])
     return _read_load(builder.mechanism, force, columns, builder.path(loads))
@@ -227,12 +230,13 @@ def _read_load(
     # A point alone applies nothing.
     if not functions.keys() & {"force", "torque"}:
         raise DocumentError(
-            f"'{force.name}' has no force_identifier and no torque_identifier; give it one",
+            f"'{force.name}' has no force_identifier and no torque_identifier; add one",
             file=file,
         )
     if "point" in functions and "force" not in functions:
         raise DocumentError(
-            f"'{force.name}' has a point_identifier and no force_identifier; leave it out",
+            f"'{force.name}' has a point_identifier, but no force_identifier; leave out the point_identifier, "
+            "or add a force_identifier",
             file=file,
         )
 
@@ -352,14 +356,14 @@ class _Columns:
         file, labels = self.table.file, self.table.columns
         if indices:
             result = join_words([labels[index] for index in indices])
-            return f"exactly three columns must begin with it, and '{file}' has {result}"
+            return f"exactly three column labels must begin with this text, but in '{file}' these do: {result}"
         # Labels without their last letter are the possible identifiers.
         starts = [label[:-1] for label in labels if label[-1:] in ("x", "X", "1")]
         nearest = find_nearest(identifier, starts) or find_nearest(identifier, labels)
         hint = (
             f"; did you mean '{nearest}'?" if nearest else f"; its columns are {join_words(labels)}"
         )
-        return f"no column of '{file}' begins with it{hint}"
+        return f"no column label of '{file}' begins with this text{hint}"
 
 
 def make_column_functions(times: Array, columns: Array) -> list[SmoothFunction]:

@@ -151,7 +151,7 @@ def _read_joints(builder: ElementBuilder, probe: JointInternalPowerProbe) -> Rea
         isinstance(item, Lock | PrescribedCoordinate) for item in mechanism.constraints
     ):
         raise builder.make_unsupported_error(
-            probe, " of prescribed coordinates beside other constraints"
+            probe, " of prescribed coordinates in a model that also has constraints"
         )
     reading = define_reading(
         probe.name, [joint.name for joint in joints], (), is_sum=probe.sum_powers_together

@@ -88,7 +88,7 @@ def define_curve(
             return make(*properties.values())
         except ValueError as error:
             raise ModelError(
-                f"the {name} of '{builder.path(force)}' makes no curve: {error}"
+                f"the properties of the {name} of '{builder.path(force)}' do not define a curve: {error}"
             ) from None
 
     return Vector(size, read)

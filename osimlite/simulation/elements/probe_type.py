@@ -238,7 +238,7 @@ def make_probes(builder: ElementBuilder, elements: Sequence[ForceElement]) -> li
         try:
             result.append(_make_probe(probe_type, builder, probe, by_path))
         except UnsupportedError as error:
-            warn_caller(f"{error.message} is left out: its probe is not reported")
+            warn_caller(f"left out of the results: {error.message}")
     return result
 
 

@@ -136,8 +136,8 @@ class TriangleMesh:
         open_edges = np.count_nonzero(~np.isin(codes, back)) + np.count_nonzero(counts > 1)
         if open_edges:
             raise ModelError(
-                f"the mesh is not a closed surface: {open_edges} edges do not have one triangle on either side that "
-                "turn the same way; close it in a mesh program",
+                f"the mesh is not a closed surface: at {open_edges} edges, a neighbouring triangle is missing, "
+                "or the two triangles have opposite orientations; repair the mesh in a mesh program",
                 file=file,
             )
         result = cls(points, triangles)

@@ -48,8 +48,8 @@ def make_engine(mechanism: Mechanism, forces: Forces, settings: EngineSettings) 
         )
     if settings.route not in ("auto", CompiledEngine.route):
         raise OsimliteError(
-            f"the compiled engine has no route '{settings.route}'; there is {CompiledEngine.route}, and others of "
-            "engine 'bullet'"
+            f"the compiled engine has no route '{settings.route}'; leave it out; "
+            "only engine 'bullet' has other routes"
         )
     return CompiledEngine(mechanism, forces)
 
@@ -80,14 +80,15 @@ def run_many(
     count = len(starts)
     if vectors.shape not in ((1, len(engine.numbers)), (count, len(engine.numbers))):
         raise OsimliteError(
-            f"the numbers are one row of {len(engine.numbers)} for each of the {count} runs; got {vectors.shape}"
+            f"expected an array of {count} rows (one for each run) of {len(engine.numbers)} numbers; got the "
+            f"shape {vectors.shape}"
         )
     kinds, levels = _encode_watches(engine, options.watches)
     controller_runs = None
     if options.controllers:
         if len(options.controllers) != count:
             raise OsimliteError(
-                f"{len(options.controllers)} controllers are given for {count} runs"
+                f"{len(options.controllers)} controllers are given for {count} runs; give one for each run"
             )
         first, *others = options.controllers
         controller_runs = first.make_runs(engine, engine.forces.controls, other_controllers=others)
@@ -205,13 +206,13 @@ def _encode_watches(engine: CompiledEngine, watches: Sequence[Watch]) -> tuple[I
     for row, watch in enumerate(watches):
         if bool(watch.coordinate) + bool(watch.body) + bool(watch.contact) != 1:
             raise OsimliteError(
-                f"the watch '{watch.name}' is on a coordinate, a body or a contact; name one of them"
+                f"the watch '{watch.name}' must name exactly one of: coordinate, body, contact"
             )
         if watch.coordinate:
             coordinate = mechanism.coordinate_index(watch.coordinate)
             if coordinate not in engine.order:
                 raise OsimliteError(
-                    f"the watch '{watch.name}' looks at '{watch.coordinate}', which is locked"
+                    f"the watch '{watch.name}' names the coordinate '{watch.coordinate}', which is locked"
                 )
             kinds[row] = record.WATCH.COORDINATE, engine.order.index(coordinate), watch.stops
             levels[row, 6] = watch.level

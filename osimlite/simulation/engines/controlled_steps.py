@@ -185,7 +185,7 @@ class ControlledSteps(Stepper):
             to: end of the run, s.
         """
         if times and times[0] < self.time:
-            raise ValueError(f"t = {times[0]:.9g} s is before the present {self.time:.9g} s")
+            raise ValueError(f"t = {times[0]:.9g} s is before the current time, {self.time:.9g} s")
         batch = BatchWorkspace(
             self._engine,
             [self.state],
@@ -283,22 +283,22 @@ class ControlledSteps(Stepper):
             key=lambda k: relative_errors[k] if isfinite(relative_errors[k]) else inf,
         )
         if not isfinite(relative_errors[index]):
-            fault = f"leaves the range of numbers in {self._get_state_name(index)}"
+            fault = f"makes a number infinite or NaN: {self._get_state_name(index)}"
         elif relative_errors[index] > self._accuracy:
             fault = (
-                f"misses the accuracy {relative_errors[index] / self._accuracy:.3g} times, "
-                f"most of all in {self._get_state_name(index)}"
+                f"has an error of {relative_errors[index] / self._accuracy:.3g} times the accuracy, "
+                f"mainly in {self._get_state_name(index)}"
             )
         elif self._engine.structure[MODEL.CONSTRAINED]:
-            fault = "ends too far from the constraints"
+            fault = "ends in a state that violates the constraints"
         else:
             fault = "ends in a state that cannot be computed"
         # With loose accuracy, muscle fibers diverge; with a strict one, stiff forces are the usual
         # cause.
         other = "smaller" if self._accuracy > DEFAULT_ACCURACY else "larger"
         raise IntegrationError(
-            f"The integrator cannot continue at t = {t0:.9g} s: even its shortest step of {h:.3g} s {fault}. "
-            "Something changes too abruptly there, such as a very stiff contact or a sharp limit: soften it, or "
+            f"The integrator cannot continue at t = {t0:.9g} s: even a step of {h:.3g} s, the shortest, {fault}. "
+            "A force changes too abruptly there, for example in a very stiff contact or at a sharp limit: soften it, or "
             f"use a {other} accuracy value.",
             t0,
             index,

@@ -114,7 +114,7 @@ class _Collector:
             return
         appearance = geometry.appearance
         if not appearance.visible:
-            note("hidden-visual", path, "a shape that is there but not shown", "left out")
+            note("hidden-visual", path, "a hidden shape", "left out")
             return
         shape_and_frame = self._shape(geometry, path)
         if shape_and_frame is None:
@@ -193,7 +193,7 @@ class _Collector:
                 note(
                     "elliptic-cylinder",
                     path,
-                    "a cylinder that is not round",
+                    "a cylinder whose cross section is not a circle",
                     "written as a mesh file",
                     file,
                 )
@@ -281,15 +281,15 @@ def mesh_shape(
         form = (
             "VTK's format"
             if copy.source.suffix.lower() == ".vtp"
-            else "a form that not every program reads"
+            else "a file format that not every program reads"
         )
         note("mesh-format", path, f"a mesh in {form}", copy.converted, f"{name} as {copy.file}")
     if copy.misspelt:
         note(
             "mesh-name",
             path,
-            "a file name in other capitals than the file's",
-            "the file with the other name used",
+            "a file name that differs from the file's real name in capital letters",
+            "the file with the real name used",
             f"{name} as {copy.source.name}",
         )
     x, y, z = (abs(factor) for factor in scale)

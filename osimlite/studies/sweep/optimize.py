@@ -169,11 +169,11 @@ def optimize(
             "a search needs a budget of at least 1 run, and a population of at least 2"
         )
     if not 0 <= seed < 2**32:
-        raise SettingError(f"the seed is a whole number from 0 to {2**32 - 1}, not {seed}")
+        raise SettingError(f"the seed must be a whole number from 0 to {2**32 - 1}, not {seed}")
     if tolerance is not None and not (isfinite(tolerance) and tolerance >= 0.0):
-        raise SettingError(f"the tolerance is a number from 0 on, not {tolerance:g}")
+        raise SettingError(f"the tolerance must be a number of at least 0, not {tolerance:g}")
     if not (isfinite(sigma) and sigma > 0.0):
-        raise SettingError(f"the first search distance is positive, not {sigma:g}")
+        raise SettingError(f"sigma must be positive, not {sigma:g}")
     names = [get_measure_name(spec) for spec in (objective.measure, *plan.measures)]
     # The objective comes first, and only once if the plan has it, too.
     measures = tuple(dict(zip(names, (objective.measure, *plan.measures), strict=True)).values())

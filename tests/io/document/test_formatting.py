@@ -68,7 +68,7 @@ def test_comments_around_the_document_stay() -> None:
 
 def test_what_no_upgrade_carries_over_is_laid_out_all_the_same() -> None:
     text = DOCUMENT.format(10800, "<of_a_plug_in>\n1 </of_a_plug_in>")
-    with pytest.raises(DocumentError, match="that would be lost"):
+    with pytest.raises(DocumentError, match="which would be lost"):
         read_document(Source(text.encode()))
     assert laid_out("<of_a_plug_in>\n1 </of_a_plug_in>", 10800) == "<of_a_plug_in>1</of_a_plug_in>"
 

@@ -216,7 +216,7 @@ PROPERTY = {"name": "gain", "type": "double"}
             3,
             "needs 'tag' and 'connectee_type'",
         ),
-        ({"bases": ["Mine"]}, 3, "derive from each other"),
+        ({"bases": ["Mine"]}, 3, "form a circle"),
     ],
 )
 def test_a_wrong_declaration_is_told_with_its_line(folder, entry, line, words):

@@ -35,7 +35,11 @@ HEAD = '<OpenSimDocument Version="40600">\n'
         ),
         (HEAD + "<Model>\n  <Body></Body\n  </Model>", "</Model>", "expected '>'"),
         (HEAD + "<Model>\n  <Body>", ">", "before <Body> of line 3 is closed"),
-        (HEAD + "<Model>\n  <Body name=a'/></Model></OpenSimDocument>", "a'/>", "stands in quotes"),
+        (
+            HEAD + "<Model>\n  <Body name=a'/></Model></OpenSimDocument>",
+            "a'/>",
+            "must be in quotes",
+        ),
         (HEAD + "<Model/></OpenSimDocument>\n\n<Model/>", "<Model/>", "after the root element"),
     ],
 )

@@ -105,7 +105,7 @@ def test_the_integral_has_the_curve_as_its_slope(low, curviness, x):
         ),
         (
             lambda: muscle_curves.fiber_force_length(0.0, 0.6, 0.2),
-            "stiffness_at_low_force and what follows",
+            "stiffness_at_low_force and the optional properties",
         ),
         (lambda: muscle_curves.tendon_force_length(0.05, 40.0, 1.0, 0.5), "norm_force_at_toe_end"),
         (
@@ -125,7 +125,7 @@ def test_what_makes_no_curve(make, words):
 
 def test_slopes_that_meet_beside_their_section_make_no_curve() -> None:
     # OpenSim 4.6 refuses this curve: x decreases at first, so that it cannot be inverted.
-    with pytest.raises(ValueError, match="meet beside"):
+    with pytest.raises(ValueError, match="do not intersect between"):
         muscle_curves.active_force_length(
             0.7128559333577094, 0.9806258776360097, 4.995436, 2.3516971896065857, 0.0
         )

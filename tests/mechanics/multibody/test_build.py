@@ -421,7 +421,11 @@ def _no_inertia(model: Model, body: Body, joint: Joint) -> None:
             "'/jointset/hinge'.*socket_child_frame.*'/bodyset/rodd'.*did you mean",
         ),
         (_circle, ModelError, "'/bodyset/rod/first' is fixed to itself"),
-        (_extra_coordinate, ModelError, "PinJoint '/jointset/hinge' has 2 coordinates and needs 1"),
+        (
+            _extra_coordinate,
+            ModelError,
+            "PinJoint '/jointset/hinge' has 2 coordinates, but needs 1",
+        ),
         (
             _prescribed,
             UnsupportedError,

@@ -156,7 +156,7 @@ def test_controllers_of_the_examples(model, tmp_path):
     assert told(model, tmp_path).message == message
     brain.enabled = False
     model.add(ToyPropMyoController(name="myo", socket_actuator="/forceset/motor"))
-    message = "driven by the ToyPropMyoController '/controllerset/myo', which follows an activation"
+    message = "driven by the ToyPropMyoController '/controllerset/myo', whose control follows an activation"
     assert message in told(model, tmp_path).message
 
 

@@ -195,7 +195,7 @@ def test_numbers_of_another_model_of_the_structure():
             "thelen_default",
             "ignore_tendon_compliance",
             True,
-            "is true, which a Thelen2003Muscle cannot do",
+            "is true, which a Thelen2003Muscle does not support",
         ),
         ("thelen_default", "fv_linear_extrap_threshold", 0.7, "is not above 1 / Flen"),
         ("thelen_default", "min_control", 0.0, "is below its minimum_activation, 0.01"),
@@ -206,19 +206,20 @@ def test_numbers_of_another_model_of_the_structure():
             "millard_damped",
             "tendon_force_length_curve",
             TendonForceLengthCurve(stiffness_at_one_norm_force=20.0),
-            "makes no curve: its stiffness_at_one_norm_force and what follows it are neither all given nor all left",
+            "do not define a curve: its stiffness_at_one_norm_force and the optional properties after it "
+            "must be either all given or all left",
         ),
         (
             "millard_damped",
             "force_velocity_curve",
             ForceVelocityCurve(isometric_slope=0.5),
-            "makes no curve: its isometric_slope is not above 1",
+            "do not define a curve: its isometric_slope is not above 1",
         ),
         (
             "millard_damped",
             "force_velocity_curve",
             ForceVelocityCurve(eccentric_slope_near_vmax=0.0),
-            "makes no curve: its eccentric_slope_near_vmax is less than 1.49e-08",
+            "do not define a curve: its eccentric_slope_near_vmax is less than 1.49e-08",
         ),
         (
             "millard_damped",
@@ -230,7 +231,7 @@ def test_numbers_of_another_model_of_the_structure():
             "millard_damped",
             "tendon_force_length_curve",
             TendonForceLengthCurve(strain_at_one_norm_force=1e-160),
-            "makes no curve: its strain_at_one_norm_force is not above",
+            "do not define a curve: its strain_at_one_norm_force is not above",
         ),
     ],
 )

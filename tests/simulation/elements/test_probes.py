@@ -98,9 +98,7 @@ def test_what_is_left_out(model, probe, message):
     model.add(probe.model_copy(), SystemEnergyProbe(name="other"))
     with pytest.warns(DoubtfulWarning) as caught:
         trajectory = osimlite.simulate(model, to=0.01, engine="compiled")
-    assert [str(item.message) for item in caught] == [
-        f"{message} is left out: its probe is not reported"
-    ]
+    assert [str(item.message) for item in caught] == [f"left out of the results: {message}"]
     assert list(trajectory.probes) == ["other"]
 
 
@@ -126,7 +124,7 @@ def test_metabolic_probes_that_opensim_switches_off(name, value, words):
     setattr(model.probe_set.objects[0].metabolic_muscle_parameter_set.objects[0], name, value)
     with pytest.warns(DoubtfulWarning) as caught:
         forces = force_elements(model, build_mechanism(model))
-    told = f"'/probeset/used' (Umberger2010MuscleMetabolicsProbe {words}) is left out: its probe is not reported"
+    told = f"left out of the results: '/probeset/used' (Umberger2010MuscleMetabolicsProbe {words})"
     assert [str(item.message) for item in caught] == [told]
     assert [element.path for element in forces.elements] == ["/forceset/mu"]
 

@@ -34,8 +34,8 @@ def move_engine_content(draft: Draft) -> None:
                     or "its content"
                 )
                 raise UpgradeError(
-                    f"document version {draft.version} describes its bodies for a <{engine.tag}>, which no later format "
-                    f"can say: {lost} would be lost; export the model for Simbody with the program that wrote it",
+                    f"document version {draft.version} describes its bodies for a <{engine.tag}>. Later formats "
+                    f"cannot express this, and {lost} would be lost; export the model for Simbody with the program that wrote it",
                     draft.numbers[engine],
                 )
             for part in list_elements(engine):

@@ -265,7 +265,8 @@ def convert_point_coordinates(draft: Draft) -> None:
                 draft.record_refusal(
                     point,
                     child,
-                    f"coordinate '{name}' is '{opensim_paths[name]}' for OpenSim, by the first element of that name, and not "
+                    f"OpenSim understands coordinate '{name}' as '{opensim_paths[name]}', the first element "
+                    "of that name, and not as "
                     f"'{paths[name]}'",
                 )
             draft.rename(child, f"socket_{child.tag}")

@@ -178,7 +178,7 @@ def compute_full_force(
 def _check_flags(builder: ElementBuilder, force: Any) -> None:
     # These classes have the flags of their base, but not the behaviour.
     for flag in ("ignore_tendon_compliance", "ignore_activation_dynamics"):
-        words = f"is true, which a {type(force).__name__} cannot do"
+        words = f"is true, which a {type(force).__name__} does not support; set it to false"
         Number(flag, lambda x: x == 0.0, words).read(builder, force)
 
 

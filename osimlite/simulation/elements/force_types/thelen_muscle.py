@@ -26,7 +26,11 @@ def _check_muscle(builder: ElementBuilder, force: Thelen2003Muscle) -> None:
         builder,
         force,
         *(
-            Number(flag, lambda x: x == 0.0, "is true, which a Thelen2003Muscle cannot do")
+            Number(
+                flag,
+                lambda x: x == 0.0,
+                "is true, which a Thelen2003Muscle does not support; set it to false",
+            )
             for flag in flags
         ),
         Number("minimum_activation", lambda x: x >= 0.01, "is less than 0.01"),

@@ -102,7 +102,7 @@ class BulletEngine(KernelEngine):
         visuals: Visuals | None = None,
     ) -> None:
         if route not in ROUTES:
-            raise OsimliteError(f"there is no route '{route}'; there are {', '.join(ROUTES)}")
+            raise OsimliteError(f"unknown route '{route}'; expected one of {', '.join(ROUTES)}")
         free = find_free_coordinates(mechanism)
         fixed = [index for index in range(len(mechanism.coordinates)) if index not in free]
         shapes = {} if visuals is None else visuals.by_body
@@ -118,8 +118,8 @@ class BulletEngine(KernelEngine):
             require_masses(robot)
         elif route == ARTICULATED_BODY:
             raise UnsupportedError(
-                f"the route {ARTICULATED_BODY} is for models without constraints whose coordinates move one axis each; "
-                f"take {MASS_MATRIX} for '{mechanism.name}'"
+                f"the route {ARTICULATED_BODY} needs a model without constraints, in which each coordinate moves only one axis; "
+                f"use {MASS_MATRIX} for '{mechanism.name}'"
             )
         files = {} if visuals is None else visuals.files
         self.window: Window | None = None

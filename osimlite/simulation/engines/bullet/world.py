@@ -250,7 +250,7 @@ def _connect() -> int:
     client = int(bullet.connect(bullet.DIRECT))
     if client < 0:
         raise SimulationError(
-            "Bullet opens no more worlds; close the engines that are not needed any more"
+            "Bullet cannot open another simulation; close engines that you no longer need"
         )
     return client
 
@@ -296,8 +296,8 @@ def require_masses(robot: Robot) -> None:
         if joint.child not in carriers and links[joint.child].mass == 0.0:
             body = next(iter(links[joint.child].bodies), joint.child)
             raise SimulationError(
-                f"the body '{body}' has no mass and carries none, so the motion of the joint "
-                f"'{joint.source}' is undetermined; give it mass and inertia, or lock the coordinates of the joint"
+                f"the body '{body}' and the bodies attached to it have no mass, so the motion of the joint "
+                f"'{joint.source}' is undetermined; give the body mass and inertia, or lock the coordinates of the joint"
             )
 
 

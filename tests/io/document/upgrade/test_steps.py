@@ -288,7 +288,7 @@ def test_a_model_without_a_document_around_it() -> None:
         (10900, "\n<angle_units>degrees</angle_units>", ["<angle_units>", "lost"]),
         (10900, BODIES.replace("PinJoint", "CustomJoint").replace("<CoordinateSet>", FOUR_AXES + "<CoordinateSet>"),
          ["hip", "4 axes of rotation", "lost"]),
-        (9, "", ["version 9", "begin at 10500"]),
+        (9, "", ["version 9", "oldest is 10500"]),
     ],
 )  # fmt: skip
 def test_a_document_too_old_is_refused_with_what_would_be_lost(

@@ -202,12 +202,13 @@ def _read_function(function: Any, arguments: int, description: str) -> SmoothFun
         inner = inner.function
     if isinstance(inner, Constant):
         raise ModelError(
-            f"{description} is a Constant, which has no arguments in OpenSim; use a LinearFunction"
+            f"{description} is a Constant; in OpenSim, a Constant cannot depend on coordinates. Use a LinearFunction"
         )
     if isinstance(function, ExpressionBasedFunction):
         if len(function.variables) != arguments:
             raise ModelError(
-                f"{description} has {len(function.variables)} variables and gets {arguments}; name as many"
+                f"{description} has {len(function.variables)} variables, but is called with {arguments}; name "
+                f"{arguments} variables"
             )
         return Formula.parse(function.expression, function.variables, description)
     return convert_function(function, arguments, description)

@@ -328,7 +328,7 @@ def _read_surface(
     may_be_zero = is_a(surface, "WrapCylinder") or is_a(surface, "WrapSphere")
     if min(sizes) < 0.0 or (min(sizes) == 0.0 and not may_be_zero):
         raise ModelError(
-            f"'{builder.path(surface)}' has a size that is not positive; give it a positive one"
+            f"'{builder.path(surface)}' has a size that is not positive; give a positive size"
         )
     # Ranges count from 1; values below 1 stand for the ends.
     first, last = (

@@ -252,7 +252,7 @@ def read_cable(builder: ElementBuilder, owner: Any) -> Cable:
     if cable is None:
         raise ModelError(
             f"the path of '{builder.path(owner)}' cannot be wrapped over its obstacles in the default pose: a point or "
-            "another obstacle is inside one, or a contact_hint leads nowhere; move them apart"
+            "obstacle is inside another obstacle, or a contact_hint is unsuitable; move the parts apart, or change the hint"
         )
     return cable
 
@@ -336,7 +336,7 @@ def _read_obstacle(builder: ElementBuilder, owner: Any, item: Any) -> CableObsta
         # OpenSim asks each obstacle for the equation of its surface, which meshes do not have.
         raise ModelError(
             f"the obstacle '{geometry.name}' of the path of '{builder.path(owner)}' is a "
-            f"{get_class_name(geometry)}, over which no path runs; use a sphere, cylinder, "
+            f"{get_class_name(geometry)}, which osimlite does not support as an obstacle; use a sphere, cylinder, "
             "ellipsoid, torus or half-space"
         )
     builder.check_finite(geometry, (*surface, *geometry.location, *geometry.orientation))
@@ -356,7 +356,7 @@ def _read_obstacle(builder: ElementBuilder, owner: Any, item: Any) -> CableObsta
         if _is_middle(surface, hint):
             raise ModelError(
                 f"the contact_hint of the obstacle '{geometry.name}' of the path of '{builder.path(owner)}' is in the "
-                "middle of the surface, so that no point of it is nearest; move it off the middle"
+                "middle of the surface, so no point of the surface is nearest to it; move the hint away from the middle"
             )
         nearest_point = _find_nearest_point(surface, hint)
         for end in (GEODESIC.START, GEODESIC.END):
@@ -384,8 +384,8 @@ def _check_size(
     """
     if isinstance(geometry, ContactSphere | ContactCylinder) and geometry.radius <= 0.0:
         raise UnsupportedError(
-            f"'{builder.path(geometry)}' has a radius that is not positive, around which a path "
-            "has no meaning; give it a positive one"
+            f"'{builder.path(geometry)}' has a radius that is not positive, so no path can wrap "
+            "around it; give a positive radius"
         )
     if isinstance(geometry, ContactTorus):
         is_surface = geometry.torus_radius >= 0.0 and geometry.tube_radius != 0.0
@@ -393,7 +393,7 @@ def _check_size(
         is_surface = min(surface[1:3]) > 0.0 and min(surface) >= 0.0
     if not is_surface:
         raise ModelError(
-            f"'{builder.path(geometry)}' has a size that is not positive; give it a positive one"
+            f"'{builder.path(geometry)}' has a size that is not positive; give a positive size"
         )
 
 
