@@ -287,7 +287,7 @@ def test_what_cannot_be_is_said(made, walker, tmp_path):
     with pytest.raises(SettingError, match="use --method nelder-mead"):
         optimize(plan(walker, {"RHip_rz": (0.3, 0.5)}), DISTANCE, tmp_path)
     with pytest.raises(
-        SettingError, match=r"'RHip_rz' has 3 grid points, .*: leave the number out"
+        SettingError, match=r"'RHip_rz' has 3 grid points, .*; leave out the number of points"
     ):
         optimize(plan(walker, {"RHip_rz": "0.3:0.5:3"}), DISTANCE, tmp_path)
     assert not list(tmp_path.iterdir())
