@@ -50,7 +50,7 @@ class Motion:
     states: Array  # states (t, y), in the order of the simulation's engine
     # Start and ends of all steps, if the motion was integrated.
     steps: Sequence[Moment] = ()
-    # Function that returns the complete measured motion, of which this motion is a part.
+    # Function that returns the complete measured motion; this motion is a part of it.
     record: Callable[[], SpeedRecord] | None = None
     # Masks of the times (t,) at which a muscle has no equilibrium and its states are NaN, by path
     # of the muscle.

@@ -174,7 +174,7 @@ def optimum(best: Optimum) -> str:
 
 
 def _embed_viewer(shown_model: Model, motion: Trajectory | None = None) -> str:
-    """Return an iframe with the viewer, or a sentence with the reason why there is none."""
+    """Return an iframe with the viewer, or a sentence with the reason why it is missing."""
     file = None if shown_model.layout is None else shown_model.layout.file
     folders = [] if file is None else [Path(file).parent, Path(file).parent / "Geometry"]
     try:

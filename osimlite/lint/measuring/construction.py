@@ -57,7 +57,7 @@ def try_construction(
         cannot be built.
     """
     with warnings.catch_warnings():
-        # Rules report faults of which a simulation only warns.
+        # Rules report faults that are only warnings of a simulation.
         warnings.simplefilter("ignore", DoubtfulWarning)
         construction = _Construction(model, folder)
         return [*construction.run()], construction.mechanism

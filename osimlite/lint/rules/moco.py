@@ -219,7 +219,7 @@ def report_study_data(setup: Setup, report: FindingCollector) -> None:
 
 
 def _describe_guess_fault(setup: Setup, tree: Tree, guess: Table) -> str:
-    """Return the fault in the columns of a trajectory; empty if there is none."""
+    """Return the fault in the columns of a trajectory; empty for correct columns."""
     # Parameters are columns of a guess as well.
     expected_columns = set(find_variables(tree, "state or control variable")) | {
         item.name for item in setup.find_by_class("MocoParameter")
@@ -388,7 +388,7 @@ def report_study_parts(setup: Setup, report: FindingCollector) -> None:
 
 
 def _describe_property_fault(parameter: Any, component: Component) -> str:
-    """Return the fault in the property of a parameter; empty if there is none."""
+    """Return the fault in the property of a parameter; empty for a correct property."""
     name, element = parameter.property_name, parameter.property_element
     spec = get_field_specs(type(component)).get(name)
     if spec is None:

@@ -301,7 +301,7 @@ def _resolve_target(
     parameters: Mapping[str, Any],
     gains: Sequence[Gain],
 ) -> tuple[Target, str] | None:
-    """Return the target that a name stands for and its unit, or None if there is none.
+    """Return the target of a name and its unit, or None for a name without a target.
 
     The first match counts, in the order of the table above: coordinate, parameter of the function,
     parameter of the controller, control, property, slope.
