@@ -41,7 +41,7 @@ from osimlite.schema.specs import (
 )
 from osimlite.schema.tree import Tree, Use, is_a
 
-NO_FILE_CONSEQUENCE = "OpenSim rejects it unless a program or the GUI supplies one"
+NO_FILE_CONSEQUENCE = "OpenSim rejects this, unless a program or the GUI supplies the file"
 """Consequence for a tool that lacks the name of a required file."""
 # Cheap test of the first bytes of a file, which saves parsing documents that cannot be tools.
 _NAMES_MODEL = compile_later(rb"Tool|Moco|ModelProcessor")

@@ -30,7 +30,10 @@ def format_quantity(value: float | tuple[float, ...], unit: str | None = None) -
         f"{item:.6g}" if item == item and abs(item) != float("inf") else format_shortest(item)
         for item in values
     )
-    return f"{text} {unit}" if unit else text
+    if not unit:
+        return text
+    # Some properties have one unit for rotations and another for translations.
+    return f"{text} {unit.replace(' (rotational) | ', ' or ').replace(' | ', ' or ')}"
 
 
 def format_value(value: object) -> str:

@@ -16,7 +16,7 @@ class ContactHalfSpace(ContactGeometry):
 class ContactSphere(ContactGeometry):
     """Sphere as contact surface or obstacle."""
 
-    facts = Facts(doubtful={"radius": "it touches nothing"})
+    facts = Facts(doubtful={"radius": "the sphere touches nothing"})
 
     radius: Annotated[float, real("m", "> 0")] = 0.0
     """Radius of the sphere."""

@@ -64,7 +64,7 @@ class HuntCrossleyForce(Force):
     """Contact between all surfaces it lists: Hertz stiffness, Hunt-Crossley dissipation, Stribeck friction."""
 
     facts = Facts(
-        doubtful={"transition_velocity": "friction no longer passes from rest to sliding"}
+        doubtful={"transition_velocity": "friction has no transition between rest and sliding"}
     )
 
     ContactParameters: ClassVar = HuntCrossleyContactParameters

@@ -93,7 +93,7 @@ def test_what_is_no_file_is_not_included_in_an_editor(special: Path, tmp_path: P
     source = Source.from_text(INCLUDING.format(special), str(tmp_path / "new.osim"))
     (result,) = (finding for finding in check_source(source) if finding.code == "OSIM702")
     assert "which is not read: this is a " in result.message and result.message.endswith(
-        ": it stays empty"
+        ": the object stays empty"
     )
 
 

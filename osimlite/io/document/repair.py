@@ -286,7 +286,9 @@ def _quote_attributes(piece: str, offset: int, repairs: list[Repair]) -> str:
         if match["name"] is None:
             return match[0]
         consequence = (
-            "OpenSim takes it for quoted" if match["bare"] else "OpenSim takes its value for empty"
+            "OpenSim reads it as if it were quoted"
+            if match["bare"]
+            else "OpenSim reads an empty value"
         )
         repairs.append(Repair("overlooked", offset + match.start(), match[0], consequence))
         return f'{match["name"]}="{match["bare"] or ""}"'
@@ -330,7 +332,7 @@ def _escape_ampersands(text: str, offset: int, repairs: list[Repair]) -> str:
         ):
             return match[0]
         repairs.append(
-            Repair("overlooked", offset + match.start(), match[0], "OpenSim makes a byte of it")
+            Repair("overlooked", offset + match.start(), match[0], "OpenSim reads it as one byte")
         )
         return _REPLACEMENT
 

@@ -78,7 +78,7 @@ def report_unmet_constraint(subject: Subject, report: FindingCollector) -> None:
             subject,
             report,
             obstacle,
-            f"{obstacle.message}: OpenSim cannot start a simulation from this pose",
+            f"{obstacle.message}; OpenSim cannot start a simulation from this pose",
         )
 
 
@@ -139,7 +139,7 @@ def report_singular_mass_matrix(subject: Subject, report: FindingCollector) -> N
     if _has_error(report, "2456"):
         return
     for obstacle in _select_unreported(subject, report, Stage.INERTIA):
-        message = f"{obstacle.message}: OpenSim computes NaN, or accelerations without meaning"
+        message = f"{obstacle.message}: OpenSim computes NaN, or meaningless accelerations"
         _report_obstacle(subject, report, obstacle, message)
 
 

@@ -190,7 +190,7 @@ def report_idle_coordinate(subject: Subject, report: FindingCollector) -> None:
         for coordinate in idle:
             axes = [axis.name for axis in list_axes(joint) if coordinate.name in axis.names]
             state = (
-                f"does not change its axes {join_words(axes)}"
+                f"does not change the value of {join_words(axes)}"
                 if axes
                 else "is not used by any of its axes"
             )

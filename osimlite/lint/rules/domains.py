@@ -484,7 +484,7 @@ def _report_domain(
     domain_text = (
         re.sub(r"^>= (\S+)$", r"\1 or more", rounded)
         .replace(">", "more than")
-        .replace("!=", "other than")
+        .replace("!=", "a number other than")
     )
     consequence = f": {verdict.consequence}" if verdict.consequence else ""
     report(

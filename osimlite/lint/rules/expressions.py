@@ -63,7 +63,7 @@ def report_broken_expression(subject: Subject, report: FindingCollector) -> None
             report(
                 f"{tag} of "
                 f"{subject.describe_part(item) if not item.name else describe_object(item)} is "
-                f"{formula_text}: {reason}; {UNUSED if is_off else 'OpenSim cannot compute it'}",
+                f"{formula_text}: {UNUSED if is_off else 'OpenSim cannot compute it'}; {reason}",
                 item,
                 tag=tag,
                 consequence=FAILS

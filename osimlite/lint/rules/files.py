@@ -157,7 +157,7 @@ def report_included_file(subject: Subject, report: FindingCollector) -> None:
         consequence = (
             ": OpenSim ignores the content given here"
             if ignored
-            else ": it stays empty"
+            else ": the object stays empty"
             if note.why
             else ""
         )

@@ -83,11 +83,11 @@ def report_unsorted_abscissae(subject: Subject, report: FindingCollector) -> Non
                     if level
                     else ("OpenSim computes wrong values", RUNS)
                 )
-                relation = "repeats" if current_x == previous_x else "is smaller than"
+                relation = "equal to" if current_x == previous_x else "smaller than"
                 word, nth = subject.word_at(function, "x", index)
                 report(
-                    f"x of {subject.describe_part(function)}: number {index + 1}, "
-                    f"{format_quantity(current_x)}, {relation} the one before; {description}",
+                    f"x value {index + 1} of {subject.describe_part(function)} is {format_quantity(current_x)}, "
+                    f"{relation} the x value before: {description}",
                     function,
                     consequence=consequence,
                     tag="x",
@@ -129,7 +129,7 @@ def report_unequal_points(subject: Subject, report: FindingCollector) -> None:
             if is_disabled or (ys < xs and is_a(function, "GCVSpline"))
             else ("OpenSim reads beyond the end of the list", None)
             if ys < xs
-            else ("the extra values are ignored", RUNS)
+            else ("OpenSim ignores the extra values", RUNS)
         )
         report(
             f"{subject.describe_part(function)} has {xs} x values and {ys} y values: {description}",

@@ -147,8 +147,8 @@ def report_out_of_reach(subject: Subject, report: FindingCollector) -> None:
             )
         elif (ratio := (length - slack) / optimal) > longest:
             report(
-                f"{length_text}: even with a slack tendon its fibers need {ratio:.3g} optimal fiber "
-                "lengths",
+                f"{length_text}: with a tendon of tendon_slack_length, its fibers are {ratio:.3g} optimal fiber "
+                "lengths long",
                 muscle,
                 tag="optimal_fiber_length",
             )

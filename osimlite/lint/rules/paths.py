@@ -44,7 +44,7 @@ def report_short_path(subject: Subject, report: FindingCollector) -> None:
         # A path that the upgrade added is reported at its owner.
         if path._index is not None or subject.source is None:
             report(
-                f"the path of {describe_object(owner)} has {format_count(len(points), 'point')} and "
+                f"the path of {describe_object(owner)} has {format_count(len(points), 'point')}, but "
                 "needs two",
                 path,
             )
@@ -57,7 +57,7 @@ def report_short_path(subject: Subject, report: FindingCollector) -> None:
         owner = subject.tree.parent_of(path) or path
         if count < 2:
             report(
-                f"the path of {describe_object(owner)} has {format_count(count, 'point')} and needs two",
+                f"the path of {describe_object(owner)} has {format_count(count, 'point')}, but needs two",
                 path,
             )
             continue

@@ -228,12 +228,12 @@ def report_limit_inside_range(subject: Subject, report: FindingCollector) -> Non
                     f"{tag} of {describe_object(force)} is {format_quantity(limit, unit)}, inside "
                     f"the range of '{coordinate.name}' ({format_quantity(low)} to "
                     f"{format_quantity(high, unit)})"
-                    + ("; is it in radians?" if radians else "")
                     + (
-                        f"; it acts in the default pose, {format_quantity(start, unit)}"
+                        f"; the force already acts in the default pose, at {format_quantity(start, unit)}"
                         if acts_at_limit
                         else ""
-                    ),
+                    )
+                    + ("; is the limit in radians?" if radians else ""),
                     force,
                     tag=tag,
                     severity=WARNING if acts_at_limit or radians else None,

@@ -66,7 +66,7 @@ def report_contradicting_values(subject: Subject, report: FindingCollector) -> N
                         "" if item.name and item is owner else f" of {describe_object(owner)}"
                     )
                     report(
-                        f"{describe_object(item)}{owner_phrase}: {message}: {REFUSED}",
+                        f"{describe_object(item)}{owner_phrase}: {message}; {REFUSED}",
                         item,
                         tag=tag,
                     )

@@ -202,8 +202,8 @@ def report_input_of_another_kind(setup: Setup, report: FindingCollector) -> None
                 document is not None and not is_a(document, expected_type)
             ):
                 report(
-                    f"{naming.spec.tag} of {describe_object(naming.item)}: expected a {expected_type}, "
-                    f"but '{naming.name}' holds {actual_type}",
+                    f"{naming.spec.tag} of {describe_object(naming.item)}: expected the class {expected_type}, "
+                    f"but '{naming.name}' contains {actual_type}",
                     naming.item,
                     tag=naming.spec.tag,
                 )

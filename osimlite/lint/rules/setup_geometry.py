@@ -99,8 +99,8 @@ def report_scale_factor(setup: Setup, report: FindingCollector) -> None:
                     if factor < _MIN_FACTOR or factor > _MAX_FACTOR:
                         report(
                             f"{first_marker} and {second_marker} are {measured_distance:.3g} m apart in "
-                            f"'{scaler.marker_file}', and {model_distance:.3g} m in the model: "
-                            f"{describe_object(measurement)} scales by {factor:.3g}",
+                            f"'{scaler.marker_file}', but {model_distance:.3g} m in the model: "
+                            f"{describe_object(measurement)} scales by a factor of {factor:.3g}",
                             pair,
                             tag="markers",
                         )

@@ -102,7 +102,7 @@ def report_scale_setting(setup: Setup, report: FindingCollector) -> None:
             tool.mass < 0.0 and scaler.apply and scaler.preserve_mass_distribution
         ):
             report(
-                f"the mass is {tool.mass:g}: OpenSim keeps the mass of the generic model; set that of "
+                f"the mass is {tool.mass:g}: OpenSim keeps the mass of the generic model; write that of "
                 "the subject",
                 tool,
                 tag="mass",

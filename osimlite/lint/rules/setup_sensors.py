@@ -90,7 +90,7 @@ def report_sensor_without_frame(setup: Setup, report: FindingCollector) -> None:
         elif unknown_columns:
             report(
                 f"the model has no frame for {join_words(map(repr, unknown_columns))} of '{file}': OpenSim "
-                f"ignores them{suggest_names(unknown_columns, frames)}",
+                f"ignores such columns{suggest_names(unknown_columns, frames)}",
                 item,
                 tag=tag,
             )

@@ -219,7 +219,7 @@ def report_tool_setting(setup: Setup, report: FindingCollector) -> None:
         # RRATool must replace the forces; in other tools that is seldom meant.
         if tool.replace_force_set and not is_a(tool, "RRATool"):
             report(
-                "the forces of force_set_files replace those of the model: its muscles are gone",
+                "the forces of force_set_files replace all forces of the model, also its muscles",
                 tool,
                 tag="replace_force_set",
                 fault="replaced-forces",
@@ -291,8 +291,8 @@ def report_tool_setting(setup: Setup, report: FindingCollector) -> None:
                     and not tool.solve_for_equilibrium_for_auxiliary_states
                 ):
                     report(
-                        "coordinates do not determine fiber lengths, which stay at their "
-                        "defaults: solve_for_equilibrium_for_auxiliary_states is false",
+                        "fibers keep their default lengths, whatever the coordinates are: "
+                        "solve_for_equilibrium_for_auxiliary_states is false",
                         tool,
                         tag="solve_for_equilibrium_for_auxiliary_states",
                         fault="fibers-not-in-equilibrium",
@@ -339,7 +339,7 @@ def report_tool_setting(setup: Setup, report: FindingCollector) -> None:
         ):
             if force.name in model_forces:
                 report(
-                    f"the model has a force '{force.name}', which this one replaces",
+                    f"this force replaces the force '{force.name}' of the model",
                     force,
                     attribute="name",
                     fault="force-of-one-name",

@@ -144,8 +144,8 @@ def report_load_units(setup: Setup, report: FindingCollector) -> None:
             and low <= 1000.0 * largest / weight <= high
         ):
             report(
-                f"the forces of '{loads.datafile}' are never larger than {largest:.3g} N "
-                f"together, and the model weighs {weight:.0f} N: are they in kilonewtons?",
+                f"the sum of the forces of '{loads.datafile}' is never larger than {largest:.3g} N, "
+                f"but the model weighs {weight:.0f} N: are they in kilonewtons?",
                 loads,
                 tag="datafile",
             )
@@ -220,7 +220,7 @@ def report_ground_twice(setup: Setup, report: FindingCollector) -> None:
             )
             report(
                 f"{names} of the model and the loads of '{tool.external_loads_file}' are both ground "
-                f"reactions on {bodies}, which count twice: exclude the contact forces",
+                f"reactions on {bodies}, so the ground reaction counts twice: exclude the contact forces",
                 tool,
                 tag=tag,
             )

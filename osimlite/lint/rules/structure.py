@@ -251,7 +251,7 @@ def report_duplicate_tag(subject: Subject, report: FindingCollector) -> None:
         # Two objects of different classes in a property that holds one.
         if note.word != note.spec.tag:
             report(
-                f"<{note.spec.tag}> of {describe_object(owner)} holds one object; OpenSim takes "
+                f"<{note.spec.tag}> of {describe_object(owner)} holds one object; OpenSim uses "
                 f"the first and ignores this {note.word}",
                 owner,
                 number=note.number,
@@ -259,7 +259,7 @@ def report_duplicate_tag(subject: Subject, report: FindingCollector) -> None:
             )
             continue
         report(
-            f"{describe_object(owner)} has <{note.word}> more than once; OpenSim takes the "
+            f"{describe_object(owner)} has <{note.word}> more than once; OpenSim uses the "
             f"first{used_value} and ignores this one",
             owner,
             number=note.number,
@@ -300,7 +300,7 @@ def report_element_in_value(subject: Subject, report: FindingCollector) -> None:
             )
             continue
         report(
-            f"<{note.spec.tag}> of {describe_object(owner)} is a value and cannot hold "
+            f"<{note.spec.tag}> of {describe_object(owner)} is a value and cannot contain "
             f"<{note.word}>: OpenSim rejects the file",
             owner,
             consequence=REFUSES,

@@ -298,7 +298,7 @@ def report_time_gap(table: Table, report: FindingCollector) -> None:
         for row in gaps[:20]:
             missing_count = steps[row - 1] / table.step - 1
             loss_note = (
-                f": {format_count(round(missing_count), 'row')} seem to be missing"
+                f": {format_count(round(missing_count), 'row')} {'seems' if round(missing_count) == 1 else 'seem'} to be missing"
                 if 0.5 <= missing_count < 1e9
                 else ""
             )

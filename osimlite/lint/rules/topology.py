@@ -66,12 +66,11 @@ def report_unconnected_body(subject: Subject, report: FindingCollector) -> None:
         message = f"no joint connects {describe_object(body)}"
         if other_bodies:
             names = join_words((f"'{other_body.name}'" for other_body in other_bodies), max_count=3)
-            message = (
-                f"{describe_object(body)} is not connected to ground, nor {names}, which joints "
-                "connect with it"
-            )
+            message = f"{describe_object(body)} is not connected to ground; joints connect it only to {names}"
         elif bones.find_joints(body):
-            message = f"{describe_object(body)} is not connected to ground, only with itself"
+            message = (
+                f"{describe_object(body)} is not connected to ground; a joint connects it to itself"
+            )
         consequence = "adds a FreeJoint to ground" if not fails else "rejects the model"
         report(
             f"{message}; OpenSim {consequence}",
@@ -204,7 +203,7 @@ def report_massless_leaf(subject: Subject, report: FindingCollector) -> None:
             else ("rejects the model", REFUSES)
         )
         report(
-            f"{describe_object(body)}{welded} is massless and the end of its chain: OpenSim {description}",
+            f"{describe_object(body)}{welded} has no mass and is the last of its chain: OpenSim {description}",
             body,
             consequence=consequence,
             tag="mass",
@@ -238,7 +237,7 @@ def _describe_loop(bones: Skeleton, link: JointLink) -> tuple[str, Consequence |
         )
     return (
         "OpenSim splits the child, gives the halves another inertia, and welds them with a "
-        "constraint; or rejects the model where they do not meet in the default pose",
+        "constraint; if the halves do not meet in the default pose, it rejects the model",
         None,
     )
 

@@ -249,7 +249,7 @@ def _get_consequence(note: Note, spec: FieldSpec, kind: Value) -> Consequence:
 def _describe_used_value(note: Note, owner: Object, spec: FieldSpec, kind: Value) -> str:
     """Return which value OpenSim uses instead."""
     if note.value is not None:
-        return f"OpenSim takes {format_value(note.value)}"
+        return f"OpenSim reads {format_value(note.value)}"
     if kind.legacy:
         return "OpenSim rejects the file"
     if spec.tag == "mass" and spec.default != spec.default:

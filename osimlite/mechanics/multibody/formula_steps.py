@@ -398,11 +398,11 @@ class SimplifiedSteps:
             word = self.unknown[int(step.value)]
             suggestion = suggest_name(word, self.step_numbers)
             available = (
-                f"there is {join_words(list(self.step_numbers))}"
+                f"known names are {join_words(list(self.step_numbers))}"
                 if self.step_numbers
-                else "it has no variables"
+                else "the formula has no variables"
             )
-            raise UnknownNameError(f"there is no '{word}'{suggestion}; {available}")
+            raise UnknownNameError(f"there is no '{word}'; {available}{suggestion}")
         if step.law == "number" and math.isnan(step.value):
             raise FormulaError(
                 "a part of it without variables is not a number, such as 0/0; remove it"
