@@ -67,8 +67,11 @@ def test_formats_are_listed() -> None:
         (("walker.osim", "-o", "out"), "name a file with -o"),
         (("walker.osim", "--to", "urdv"), "unknown format 'urdv'; did you mean 'urdf'?"),
         (("walker.osim", "--from", "x"), "--from: unknown format 'x'"),
-        (("notes.txt",), "'convert' recognizes; name it with --from"),
-        (("walk.trc",), "'walk.trc' is already a table of OpenSim"),
+        (
+            ("notes.txt",),
+            "does not recognize the format of 'notes.txt'; name the format with --from",
+        ),
+        (("walk.trc",), "'walk.trc' is a table of OpenSim"),
         (("gone.b3d",), "no such file"),
         (("gone.xml", "--from", "osim", "-o", "walker.osim"), "osimlite upgrade"),
         (("gone.osim", "--from", "osim", "-o", "notes.xml"), "no such file"),

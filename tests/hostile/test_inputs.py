@@ -39,7 +39,8 @@ def write_includes(folder: Path, count: int, times: int) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("count", "times", "words"), [(19, 2, "include more than"), (30, 1, "without end")]
+    ("count", "times", "words"),
+    [(19, 2, "includes more than"), (30, 1, "endless chain of includes")],
 )
 def test_includes_have_a_budget(tmp_path: Path, count: int, times: int, words: str) -> None:
     with pytest.raises(DocumentError, match=words):

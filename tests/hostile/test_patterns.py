@@ -178,7 +178,7 @@ def test_a_pattern_looks_at_a_bounded_number_of_files(
     monkeypatch.setattr(file_patterns, "MAX_ENTRIES", 10)
     for number in range(11):
         (tmp_path / f"{number}.xml").touch()
-    with pytest.raises(OsimliteError, match="name the folders"):
+    with pytest.raises(OsimliteError, match="write the names of the folders"):
         find_files(str(tmp_path / "*.xml"))
 
 

@@ -406,7 +406,7 @@ def test_what_is_not_solved_is_refused_by_name_and_place(tmp_path):
         k for k, words in enumerate(path.read_text().splitlines(), 1) if "<MocoScaleFactor" in words
     )
     with pytest.raises(
-        osimlite.OsimliteError, match="MocoScaleFactor 'factor': a file cannot say which column"
+        osimlite.OsimliteError, match="MocoScaleFactor 'factor': a file does not store which column"
     ) as raised:
         solve(path)
     assert (raised.value.file, raised.value.line) == (str(path), line)

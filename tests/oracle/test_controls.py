@@ -289,8 +289,8 @@ def test_a_column_beside_a_function_of_the_same_name_in_an_old_document(model, w
     [
         ("moter", None, "the column 'moter' .* did you mean 'motor'"),
         ("motor", None, "by the column 'motor' and by another entry; remove one of them"),
-        ("other", -1, "is -1, which 2 rows do not allow"),
-        ("other", 3, "is 3, which 2 rows do not allow"),
+        ("other", -1, "is -1, which is impossible with 2 rows"),
+        ("other", 3, "is 3, which is impossible with 2 rows"),
     ],
 )
 def test_files_that_do_not_fit(label, method, words, tmp_path):

@@ -181,7 +181,7 @@ def test_a_picture_shows_the_moment_asked_for(tmp_path: Path):
         view.write_picture(tmp_path / "b.png", size, 0.7)
     with pytest.raises(OsimliteError, match=r"written as \.png"):
         view.write_picture(tmp_path / "b.xyz", size)
-    with pytest.raises(OsimliteError, match="a time needs a motion"):
+    with pytest.raises(OsimliteError, match="a time was given without a motion"):
         walker().write_picture(tmp_path / "b.png", size, 0.1)
     assert not (tmp_path / "b.png").exists()
 

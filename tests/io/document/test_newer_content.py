@@ -49,7 +49,7 @@ def test_a_real_document_states_its_version(corpus_model):
     try:
         require_stated_version(source)
     except VersionError as error:
-        assert "came with" not in str(error)
+        assert "exists only since" not in str(error)
     except osimlite.OsimliteError:
         pytest.skip("it is no document")
 
