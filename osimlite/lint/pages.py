@@ -20,7 +20,7 @@ _FIX_TEXTS = {
     "": "none",
     "safe": "sometimes, with --fix",
     "unsafe": "sometimes, with --unsafe-fixes (check it with --diff first)",
-    "both": "sometimes, with --fix, or with --unsafe-fixes where it is a guess",
+    "both": "sometimes: with --fix, or with --unsafe-fixes if the fix is a guess",
 }
 _CONSEQUENCE_TEXTS = {
     REFUSES: "refuses the file",
@@ -36,13 +36,13 @@ example, and the same example fixed.
 
 An **error** is something that OpenSim rejects, crashes on, computes NaN from, or reads differently from what is written.
 A **warning** is physically or numerically doubtful. An **info** is untidy, or worth knowing. A finding may have another
-severity than its rule where the file shows the reason. `--fix` makes **safe** fixes: OpenSim then reads the same model,
+severity than its rule if the file shows a reason for it. `--fix` makes **safe** fixes: OpenSim then reads the same model,
 or the one that was certainly meant. An **unsafe** fix is a guess; `--unsafe-fixes` makes it.
 
 The column **OpenSim** is about errors: OpenSim **refuses** the file or the model (or crashes or hangs), loads it and
 **fails** as soon as it needs the faulty part, computes **nan**, or **runs** it, but may compute something else than
-the file describes. It is empty if the rule does not say. Each finding has one of these words as `consequence` in
-`--format json`; that of a warning or an info is `runs`."""
+the file describes. The column is empty if the rule does not say. In `--format json`, each finding has one of these
+words as `consequence`: for a warning or an info it is `runs`."""
 _SHORT = {"": "", "safe": "safe", "unsafe": "unsafe", "both": "safe or unsafe"}
 
 

@@ -78,11 +78,11 @@ def suggest_names(unknown_texts: Iterable[str], valid_texts: Iterable[str]) -> s
     """
     sorted_texts = sorted(valid_texts)
     suggestions = [
-        f"'{text}' spelt '{name}'"
+        f"'{name}' the same as '{text}'"
         for text in unknown_texts
         if (name := find_nearest_name(text, sorted_texts))
     ]
-    return f"; is {join_words(suggestions)} there?" if suggestions else ""
+    return f"; is {join_words(suggestions)}?" if suggestions else ""
 
 
 def pick_closest(text: str, candidates: list[str]) -> str:

@@ -55,7 +55,7 @@ def test_other_contacts_push_too(tmp_path: Path, kind: str) -> None:
 
 def test_ground_that_pushes_twice(tmp_path: Path) -> None:
     folder = copy_lab("ground", tmp_path)
-    assert "count twice" in codes(folder / "id.xml")["OSIM859"]
+    assert "counts twice" in codes(folder / "id.xml")["OSIM859"]
     assert "OSIM859" not in codes(folder / "id_all.xml")
     # The foot is part of the shank, so that the force acts near that body.
     assert "OSIM849" not in codes(folder / "loads.xml")

@@ -193,7 +193,7 @@ def test_a_page_says_severity_mends_and_settings():
     assert "\nOpenSim: " not in pages["OSIM311"]
     assert "\nOpenSim, if the finding is an error: refuses the file\n" in pages["OSIM701"]
     assert (
-        "- `contact-depth = 0.001` (m): surfaces may start this deep inside each other"
+        "- `contact-depth = 0.001` (m): largest accepted depth of a sphere inside a surface at the start"
         in pages["OSIM521"]
     )
     assert "Settings" not in pages["OSIM104"]

@@ -28,19 +28,19 @@ BEYOND = Threshold(
     "limit-beyond-range",
     0.0,
     "of the range",
-    "a limit may lie outside the range by this share of the range",
+    "largest accepted distance of a limit outside the range",
 )
 INSIDE = Threshold(
     "limit-inside-range",
     0.25,
     "of the range",
-    "a limit may lie inside the range by this share of the range",
+    "largest accepted distance of a limit from the end of the range, inside the range",
 )
 UNLIMITED = Threshold(
     "unlimited-range",
     4 * math.pi,
     "rad",
-    "the rule ignores wider ranges: they mean no limit, or are in degrees",
+    "wider ranges are ignored: they mean no limit, or are in degrees",
 )
 
 

@@ -186,7 +186,7 @@ def report_time_outside_data(setup: Setup, report: FindingCollector) -> None:
                 # first one.
                 nearest = "last" if first > span[1] else "first"
                 is_scaled = is_a(item, "ModelScaler")
-                consequence = ""
+                consequence = ": OpenSim fails or crashes"
                 if is_scaled:
                     consequence = f": OpenSim measures in the {nearest} frame"
                 elif is_a(item, "InverseDynamicsTool") or is_a(item, "AnalyzeTool"):
@@ -294,7 +294,7 @@ def _list_tables(item: Any) -> Iterator[tuple[str, str]]:
 
 @rule("OSIM845", "loads-end-early", severity=WARNING, about="document")
 def report_loads_end_early(setup: Setup, report: FindingCollector) -> None:
-    """Measured loads end before the run of the tool.
+    """Measured loads do not cover the times of the tool.
 
     Compares the times of the data of external loads with those of the tool, or of the motion that
     the tool reads.
@@ -337,7 +337,7 @@ def report_loads_end_early(setup: Setup, report: FindingCollector) -> None:
         ):
             report(
                 f"the loads are measured from {span[0]:g} to {span[1]:g} s, but the tool runs "
-                f"from {first:g} to {last:g} s",
+                f"from {first:g} to {last:g} s: OpenSim extrapolates the loads linearly",
                 item,
                 tag="external_loads_file",
             )

@@ -167,11 +167,16 @@ def _describe_frame_cycle(subject: Subject, cycle: Sequence[PhysicalOffsetFrame]
     return f"{through}: OpenSim rejects the model"
 
 
-DEPTH = Threshold("contact-depth", 1e-3, "m", "surfaces may start this deep inside each other")
+DEPTH = Threshold(
+    "contact-depth", 1e-3, "m", "largest accepted depth of a sphere inside a surface at the start"
+)
 # A relative limit as well, since small spheres at the floor start a few tenths of a millimetre deep
 # by rounding.
 RELATIVE_DEPTH = Threshold(
-    "contact-depth-share", 0.1, "of the radius", "a sphere may start this deep inside a surface"
+    "contact-depth-share",
+    0.1,
+    "of the radius",
+    "the same depth, as a share of the radius; a finding needs both depths to be exceeded",
 )
 LENGTH = Threshold("largest-length", 10.0, "m", "largest plausible length on a body")
 

@@ -22,7 +22,7 @@ FORCE_BAD = Threshold(
     "residual-force-bad",
     25.0,
     "N",
-    "a larger residual force is bad",
+    "a residual force above this is bad",
 )
 FORCE_RMS_GOOD = Threshold(
     "residual-force-rms-good",
@@ -34,7 +34,7 @@ FORCE_RMS_BAD = Threshold(
     "residual-force-rms-bad",
     10.0,
     "N",
-    "a larger root mean square of a residual force is bad",
+    "a root mean square of a residual force above this is bad",
 )
 RELATIVE_MOMENT = Threshold(
     "residual-moment-share",
@@ -53,7 +53,7 @@ MOMENT_BAD = Threshold(
     "residual-moment-bad",
     75.0,
     "N m",
-    "a larger residual moment is bad",
+    "a residual moment above this is bad",
 )
 MOMENT_RMS_GOOD = Threshold(
     "residual-moment-rms-good",
@@ -65,7 +65,7 @@ MOMENT_RMS_BAD = Threshold(
     "residual-moment-rms-bad",
     50.0,
     "N m",
-    "a larger root mean square of a residual moment is bad",
+    "a root mean square of a residual moment above this is bad",
 )
 RESERVE_GOOD = Threshold(
     "reserve-good",
@@ -77,7 +77,7 @@ RESERVE_BAD = Threshold(
     "reserve-bad",
     10.0,
     "%",
-    "a larger share of the moment at the joint is bad",
+    "a reserve actuator above this share of the moment at its joint is bad",
 )
 ERROR_GOOD = Threshold(
     "tracking-error-good",
@@ -89,25 +89,25 @@ ERROR_BAD = Threshold(
     "tracking-error-bad",
     5.0,
     "deg",
-    "a larger tracking error is bad (cm for translations)",
+    "a tracking error above this is bad (cm for translations)",
 )
 ERROR_RMS_BAD = Threshold(
     "tracking-error-rms-bad",
     4.0,
     "cm",
-    "a larger root mean square of the tracking error of a translation is bad",
+    "a root mean square of the tracking error of a translation above this is bad",
 )
 FULL_GOOD = Threshold(
     "full-activation",
     5.0,
     "%",
-    "a muscle may be fully active for this share of the time",
+    "largest accepted share of the time in which a muscle is fully active",
 )
 FULL_BAD = Threshold(
     "full-activation-bad",
     25.0,
     "%",
-    "a larger share of the time is bad",
+    "a share of the time above this is bad",
 )
 PASSIVE_GOOD = Threshold(
     "passive-force",
@@ -115,7 +115,7 @@ PASSIVE_GOOD = Threshold(
     "%",
     "largest accepted passive force, as a share of the strength of the muscle",
 )
-PASSIVE_BAD = Threshold("passive-force-bad", 100.0, "%", "a larger passive force is bad")
+PASSIVE_BAD = Threshold("passive-force-bad", 100.0, "%", "a passive force above this is bad")
 
 
 @rule(

@@ -33,25 +33,25 @@ SWAPPED = Threshold(
     "swapped-frames",
     2.0,
     "%",
-    "share of the frames in which two markers fit better if swapped",
+    "largest accepted share of the frames in which two markers fit better if they are swapped",
 )
 BEYOND = Threshold(
     "beyond-range",
     2.0,
     "deg",
-    "a motion may leave the range of a coordinate by this (cm for translations)",
+    "largest accepted distance of a motion outside the range of a coordinate (cm for translations)",
 )
 FAR_BEYOND = Threshold(
     "far-beyond-range",
     10.0,
     "deg",
-    "leaving the range by more than this is bad",
+    "a distance outside the range above this is bad (cm for translations)",
 )
 LOST = Threshold(
     "filtered-away",
     2.0,
     "deg",
-    "root mean square of the motion that a filter may remove (cm for translations)",
+    "largest accepted change of a motion by a filter, as root mean square (cm for translations)",
 )
 NOISE = Threshold(
     "noise",
@@ -69,13 +69,13 @@ WEIGHT = Threshold(
     "measured-weight",
     2.0,
     "%",
-    "the mass of the model may differ by this from the weight on the force plates",
+    "largest accepted difference between the mass of the model and the mass on the force plates",
 )
 WRONG_WEIGHT = Threshold(
     "wrong-weight",
     5.0,
     "%",
-    "a larger difference of the mass is bad",
+    "a difference of the mass above this is bad",
 )
 
 
