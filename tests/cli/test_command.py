@@ -11,8 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from osimlite.base.options import list_options
-from osimlite.cli import COMMAND_SYNONYMS, COMMANDS, create_app
+from osimlite.cli import COMMANDS, create_app
 from osimlite.cli._command import Command
+from osimlite.cli._exiting import COMMAND_SYNONYMS
 from osimlite.simulation.options import Options
 from tests.cli.support import loaded
 from tests.suite import choose
