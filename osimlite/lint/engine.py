@@ -204,7 +204,9 @@ def _apply_suppressions(
                     any(map(subject.config.includes, matching_rules)) and not is_silent
                 )
                 if code not in comment.used and ran:
-                    result(f"'{code}' ignores nothing here; delete it", at=comment.position)
+                    result(
+                        f"the code '{code}' ignores nothing here; delete it", at=comment.position
+                    )
             if not comment.codes:
                 result("this comment names no code to ignore", at=comment.position)
     return remaining

@@ -33,7 +33,8 @@ def format_quantity(value: float | tuple[float, ...], unit: str | None = None) -
     if not unit:
         return text
     # Some properties have one unit for rotations and another for translations.
-    return f"{text} {unit.replace(' (rotational) | ', ' or ').replace(' | ', ' or ')}"
+    units = unit.replace(" (rotational) | ", " or ").replace(" | ", " or ")
+    return f"{text} {units.replace(' (rotational)', ' (for a rotation)')}"
 
 
 def format_value(value: object) -> str:

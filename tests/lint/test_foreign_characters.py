@@ -11,13 +11,13 @@ from osimlite.lint import validate
 @pytest.mark.parametrize(
     ("digits", "named"),
     [
-        ("1", "(there is U+FF11 (fullwidth digit one) in it)"),
+        ("1", "but the text contains U+FF11 (fullwidth digit one)"),
         (
             "121",
-            "(there is U+FF11 (fullwidth digit one) and U+FF12 (fullwidth digit two) in it)",
+            "but the text contains U+FF11 (fullwidth digit one) and U+FF12 (fullwidth digit two)",
         ),
-        ("123", "and U+FF13 (fullwidth digit three) in it)"),
-        ("12345", "U+FF13 (fullwidth digit three) and 2 more in it)"),
+        ("123", "and U+FF13 (fullwidth digit three)"),
+        ("12345", "U+FF13 (fullwidth digit three) and 2 more"),
     ],
 )
 def test_the_first_three_are_named_and_the_others_counted(digits: str, named: str) -> None:

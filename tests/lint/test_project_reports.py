@@ -98,7 +98,7 @@ def test_lines_and_comments_ignore(project):
     assert (comment.line, comment.column, comment.message) == (
         2,
         1,
-        "'OSIM809' ignores nothing here; delete it",
+        "the code 'OSIM809' ignores nothing here; delete it",
     )
 
 

@@ -115,7 +115,9 @@ def report_inertia_not_positive(subject: Subject, report: FindingCollector) -> N
         if moments[0] < -slack * max(map(abs, moments)):
             cause = (
                 # Negative moments on the diagonal are seen; products that are too large are not.
-                "" if min(body.inertia[:3]) < 0 else "; its products are too large for its moments"
+                ""
+                if min(body.inertia[:3]) < 0
+                else "; its products of inertia are too large for its moments"
             )
             report(
                 f"the inertia of {describe_object(body)} has a negative principal moment, {format_quantity(moments[0])}{cause}"

@@ -52,7 +52,9 @@ def report_impossible_bounds(setup: Setup, report: FindingCollector) -> None:
             ends: tuple[float, ...] = getattr(item, tag, ())
             phase_bounds: tuple[float, ...] = item.bounds
             if len(ends) == 2 and ends[0] > ends[1]:
-                report(f"bounds from {ends[0]:g} to {ends[1]:g}: OpenSim fails", item, tag=tag)
+                report(
+                    f"{tag} run from {ends[0]:g} down to {ends[1]:g}: OpenSim fails", item, tag=tag
+                )
             # Reversed bounds of the phase have a finding of their own.
             elif (
                 ends

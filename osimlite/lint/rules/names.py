@@ -79,7 +79,8 @@ def report_illegal_name(subject: Subject, report: FindingCollector) -> None:
     In files older than version 30500, OpenSim removes all white space from names. But from
     references it removes only white space at both ends. A reference to 'right asis' then finds
     nothing, because the component is now called 'rightasis'. OpenSim rejects the file, unless only
-    groups and controllers have such references.
+    groups and controllers have such references. If nothing refers to the name, the finding is an
+    info.
 
     ```xml
     - <Marker name="right asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>

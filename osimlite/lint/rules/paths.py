@@ -22,8 +22,8 @@ from osimlite.schema.wrapping import WrapObject
 def report_short_path(subject: Subject, report: FindingCollector) -> None:
     """A path has fewer than two points.
 
-    Reports geometry paths with no point, or with one, muscles and springs without a path, and a
-    Scholz2015GeometryPath that begins or ends with an obstacle.
+    Reports geometry paths with fewer than two points, and muscles and springs without a path. Also
+    reports a Scholz2015GeometryPath that begins or ends with an obstacle.
 
     OpenSim rejects the model.
 
@@ -86,8 +86,8 @@ def report_coincident_path_points(subject: Subject, report: FindingCollector) ->
 
     Reports a point at the same location of the same frame as the point before it.
 
-    The segment between them has no length and no direction; if it is the whole path, the length of
-    the muscle is 0. Usually a point was copied and not moved.
+    The segment between the two points has no length and no direction. If the path has no other
+    segment, the length of the muscle is 0. Usually a point was copied and not moved.
 
     ```xml
       <PathPointSet>

@@ -82,7 +82,7 @@ def report_sensor_without_frame(setup: Setup, report: FindingCollector) -> None:
             example = f", such as '{min(frames)}'" if ending else ""
             report(
                 f"no column of '{file}' has the name of a frame of the model{example}: OpenSim "
-                "rejects it",
+                "rejects the table",
                 item,
                 tag=tag,
                 severity=ERROR,

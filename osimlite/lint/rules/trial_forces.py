@@ -226,7 +226,7 @@ def report_tracking_error(trial: Trial, report: FindingCollector) -> None:
     to 2 degrees or 2 cm, and bad above 5 degrees or 5 cm. A root mean square of translations is bad
     above 4 cm.
 
-    The motion whose forces are computed is not that of the subject.
+    The computed forces belong to another motion than that of the subject.
 
     ```trial
     - peak of the error of 'pelvis_tx': 7.4 cm
@@ -275,8 +275,8 @@ def report_passive_force(trial: Trial, report: FindingCollector) -> None:
     (https://opensimconfluence.atlassian.net/wiki/spaces/OpenSim/pages/53087686) recommend to check
     them and give no limit: this limit is osimlite's.
 
-    Passive forces are not controlled. Antagonists must pull against them, which real muscles do
-    not. Static optimization ignores passive forces, so the forces that it computes are wrong.
+    No activation controls passive forces: antagonists must pull against them, which real muscles do
+    not do. Static optimization ignores passive forces, so the forces that it computes are wrong.
 
     ```trial
     - peak of the passive force of 'rect_fem_r' relative to its max_isometric_force: 130 %

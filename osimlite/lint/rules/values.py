@@ -269,7 +269,7 @@ def _describe_foreign_characters(text: str) -> str:
         f"U+{ord(letter):04X} ({unicodedata.name(letter, 'without a name').lower()})"
         for letter in foreign
     ]
-    return f" (there is {join_words(names, max_count=3)} in it)"
+    return f", but the text contains {join_words(names, max_count=3)}"
 
 
 def _make_readable(text: str, kind: Value) -> str | None:

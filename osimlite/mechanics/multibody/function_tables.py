@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from math import isfinite
 
+from osimlite.base.text import add_article
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.mechanics.kernels.functions import FUNCTION_TYPE
 from osimlite.mechanics.multibody import functions as f
@@ -36,7 +37,7 @@ def _has_table(table: list[float], function: f.SmoothFunction, description: str)
     if not table:
         name = type(function).__name__
         raise UnsupportedError(
-            f"{description} is a {name}, which osimlite cannot compute; use another function"
+            f"{description} is {add_article(name)}, which osimlite cannot compute; use another function"
         )
     return table
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from osimlite.base.text import join_words
+from osimlite.base.text import add_article, join_words
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.mechanics.multibody.spatial import Array, cross, make_offset, make_transform
 from osimlite.schema.base import Component
@@ -100,7 +100,7 @@ class Placements:
         if isinstance(frame, StationDefinedFrame):
             return self._fit_frame_to_stations(frame, path)
         raise UnsupportedError(
-            f"the frame '{path}' is a {type(frame).__name__}, a class that osimlite does not support"
+            f"the frame '{path}' is {add_article(type(frame).__name__)}, a class that osimlite does not support"
         )
 
     def follow_socket(self, owner: Component, socket: str) -> PhysicalFrame:

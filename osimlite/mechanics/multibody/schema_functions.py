@@ -8,7 +8,7 @@ from itertools import pairwise
 from math import isfinite
 from typing import TYPE_CHECKING, Any, cast
 
-from osimlite.base.text import join_words
+from osimlite.base.text import add_article, join_words
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.mechanics.multibody import functions as f
 from osimlite.schema import functions as schema
@@ -73,7 +73,7 @@ def convert_function(
             ]
             supported += _UNIVARIATE
             raise UnsupportedError(
-                f"{where} is a {name}, which osimlite cannot differentiate twice; "
+                f"{where} is {add_article(name)}, which osimlite cannot differentiate twice; "
                 f"the supported functions are {join_words(supported, max_count=len(supported))}"
             )
         _require_argument_count(function, 1, arguments)

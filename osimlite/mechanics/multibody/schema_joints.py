@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from osimlite.base.text import join_words
+from osimlite.base.text import add_article, join_words
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.mechanics.multibody.joints import (
     PLAIN_JOINTS,
@@ -102,7 +102,7 @@ def unknown_joint(path: str, class_name: str) -> UnsupportedError:
         class_name: name of its class.
     """
     return UnsupportedError(
-        f"'{path}' is a {class_name}, a class of joints that osimlite does not support; it supports "
+        f"'{path}' is {add_article(class_name)}, a class of joints that osimlite does not support; it supports "
         f"{join_words(JOINT_TYPES, max_count=len(JOINT_TYPES))}"
     )
 

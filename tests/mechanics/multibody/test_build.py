@@ -429,7 +429,7 @@ def _no_inertia(model: Model, body: Body, joint: Joint) -> None:
         (
             _prescribed,
             UnsupportedError,
-            "of '/jointset/hinge/hinge_0' is a ExpressionBasedFunction",
+            "of '/jointset/hinge/hinge_0' is an ExpressionBasedFunction",
         ),
         (_unknown_joint, UnsupportedError, "'/jointset/odd' is a ScrewJoint.*PinJoint"),
         (
