@@ -194,10 +194,11 @@ def report_wrong_class(subject: Subject, report: FindingCollector) -> None:
 
 @rule("OSIM108", "wrong-part-name", severity=ERROR, fixes="unsafe", consequences=(RUNS,))
 def report_wrong_part_name(subject: Subject, report: FindingCollector) -> None:
-    """The `name` of an object is not that of its property.
+    """The `name` of an object is not the name of its property.
 
-    Reports objects such as `<FrameGeometry name="axes">` in a body. OpenSim finds the object of a
-    property by its `name`, which must be that of the property: `frame_geometry` in this case.
+    Reports objects such as `<FrameGeometry name="axes">` in a body. OpenSim finds such an object by
+    its `name`, which must be the name of the property that contains the object: `frame_geometry` in
+    this case.
 
     OpenSim ignores the object with everything inside, and uses the default of the property.
 

@@ -161,7 +161,7 @@ def report_idle_coordinate(subject: Subject, report: FindingCollector) -> None:
     """A coordinate of a custom joint moves nothing.
 
     Reports coordinates that no axis uses. Also reports coordinates that do not change the value of
-    any axis function in the default pose: the functions are constant, have the weight 0, or read
+    any axis function in the default pose. Such functions are constant, have the weight 0, or read
     only another coordinate. Also reports joints whose coordinates all together produce fewer
     independent motions than there are coordinates.
 

@@ -33,11 +33,11 @@ def report_broken_expression(subject: Subject, report: FindingCollector) -> None
     Reports expressions with a syntax error, and those that name an unknown variable or function.
 
     OpenSim rejects the model if a formula has a syntax error. With an unknown variable, OpenSim
-    fails at the first acceleration. If the force or controller is disabled, OpenSim does not
-    compute the formula (a warning), but it still rejects a syntax error in a formula of a force
-    itself. Formulas support + - * / ^, functions such as sin, sqrt, exp, min, step, and definitions
-    after a semicolon as in `k*q; k=100`. There is no pi and no `**`. OpenSim first simplifies a
-    formula: `0*x` becomes 0, even if the variable x is unknown.
+    fails at the first acceleration. OpenSim does not compute the formulas of a disabled force or
+    controller (a warning). But it rejects a syntax error in a formula of a force even then.
+    Formulas support + - * / ^, functions such as sin, sqrt, exp, min, step, and definitions after a
+    semicolon as in `k*q; k=100`. There is no pi and no `**`. OpenSim first simplifies a formula:
+    `0*x` becomes 0, even if the variable x is unknown.
 
     ```xml
       <ExpressionBasedCoordinateForce name="spring">

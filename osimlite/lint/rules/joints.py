@@ -48,8 +48,8 @@ def report_joint_to_itself(subject: Subject, report: FindingCollector) -> None:
 def report_wrong_coordinate_count(subject: Subject, report: FindingCollector) -> None:
     """A joint has the wrong number of coordinates.
 
-    Reports joints with more or fewer coordinates than their class has, custom joints with a
-    coordinate that none of their axes uses, and (as a warning) joints without coordinates.
+    Reports joints with more or fewer coordinates than their class has. Also reports custom joints
+    with a coordinate that none of their axes uses. Joints without coordinates are a warning.
 
     OpenSim rejects the model if the number is wrong. If `<coordinates>` is missing, it creates
     coordinates with names such as `_coord_0` and the value 0.

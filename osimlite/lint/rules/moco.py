@@ -302,9 +302,9 @@ def report_study_parts(setup: Setup, report: FindingCollector) -> None:
     """A part of a study has a name or a target that OpenSim rejects.
 
     Checks for goals, constraints and parameters without a name or with a duplicate name. Also
-    checks for parameters of properties that a component does not have or that are not numbers, and
-    for goals that name a force that is not in the loads. Reports models with locked coordinates,
-    and models with joints whose speeds are not the rates of their coordinates.
+    checks for parameters whose property does not exist or is not a number, and for goals that track
+    a force that the loads do not contain. Reports models with locked coordinates, and models with
+    joints whose speeds are not the rates of their coordinates.
 
     OpenSim rejects the study.
 

@@ -84,7 +84,7 @@ DISTANCE = Threshold(
 def report_coincident_path_points(subject: Subject, report: FindingCollector) -> None:
     """Two consecutive points of a path coincide.
 
-    Reports a point at the same location of the same frame as the point before it.
+    Reports a point if the point before it is in the same frame at the same location.
 
     The segment between the two points has no length and no direction. If the path has no other
     segment, the length of the muscle is 0. Usually a point was copied and not moved.

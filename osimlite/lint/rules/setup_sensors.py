@@ -26,10 +26,10 @@ def _find_orientations(setup: Setup) -> Iterator[tuple[Any, str, str, Table]]:
 def report_sensor_without_frame(setup: Setup, report: FindingCollector) -> None:
     """A measured sensor has no frame in the model, or a named sensor was not measured.
 
-    Compares the columns of measured orientations with the frames of the model: inverse kinematics
-    uses columns with the name of a frame, the IMUPlacer those with the name of a frame and the
-    suffix `_imu`. Also checks whether the table has a column for each sensor that the tool names.
-    The table must contain quaternions.
+    Compares the columns of measured orientations with the frames of the model. Inverse kinematics
+    uses columns that have the name of a frame. The IMUPlacer uses columns that have the name of a
+    frame with the suffix `_imu`. Also checks whether the table has a column for each sensor that
+    the tool names. The table must contain quaternions.
 
     OpenSim ignores sensors without a frame; its log says only how many sensors it uses. If no
     sensor has a frame, OpenSim rejects the table.

@@ -231,7 +231,7 @@ def _report_old(
 def report_duplicate_tag(subject: Subject, report: FindingCollector) -> None:
     """A property is given twice.
 
-    Reports every element after the first of the same property in one object.
+    Reports every repetition of a property in one object.
 
     OpenSim uses the first element and ignores the others, while a person who reads the file may
     expect the last one to count. A repetition with the same content is a warning.

@@ -125,13 +125,13 @@ PASSIVE_BAD = Threshold("passive-force-bad", 100.0, "%", "a passive force above 
 def report_residual_force(trial: Trial, report: FindingCollector) -> None:
     """A residual force is large.
 
-    Checks the forces at the joint to ground, ideally zero: those of inverse dynamics, and of the
-    residual actuators of RRA, CMC and StaticOptimization. OpenSim's best practices
+    Checks the forces at the joint to ground, which are ideally zero: those of inverse dynamics, and
+    of the residual actuators of RRA, CMC and StaticOptimization. OpenSim's best practices
     (https://opensimconfluence.atlassian.net/wiki/spaces/OpenSim/pages/53087686) call a peak good up
-    to 10 N and bad above 25 N, and a root mean square good up to 5 N and bad above 10 N. Hicks and
-    others advise peaks of at most 5 % of the largest external force (2015, Is my model good
-    enough?, https://doi.org/10.1115/1.4029304). A peak that exceeds one of the two limits, but not
-    both, is okay. Residuals of inverse dynamics are an info if the trial has RRA or CMC, too.
+    to 10 N, and bad above 25 N. They call a root mean square good up to 5 N, and bad above 10 N.
+    Hicks and others advise peaks of at most 5 % of the largest external force (2015, Is my model
+    good enough?, https://doi.org/10.1115/1.4029304). A peak that exceeds one of the two limits, but
+    not both, is okay. Residuals of inverse dynamics are an info if the trial has RRA or CMC, too.
 
     Motion, masses and measured loads contradict each other. The residual force, instead of the
     muscles, makes up for the difference.
@@ -156,12 +156,12 @@ def report_residual_force(trial: Trial, report: FindingCollector) -> None:
 def report_residual_moment(trial: Trial, report: FindingCollector) -> None:
     """A residual moment is large.
 
-    Checks the moments at the joint to ground, as residual-force checks the forces. OpenSim's best
+    Checks the moments at the joint to ground, as OSIM911 checks the forces. OpenSim's best
     practices (https://opensimconfluence.atlassian.net/wiki/spaces/OpenSim/pages/53087686) call a
-    peak good up to 50 N m and bad above 75 N m, and a root mean square good up to 30 N m and bad
-    above 50 N m. Hicks and others advise at most 1 % of the largest external force times the height
-    of the mass centre (2015, Is my model good enough?, https://doi.org/10.1115/1.4029304), which is
-    much less. A peak between this limit and OpenSim's is okay.
+    peak good up to 50 N m, and bad above 75 N m. They call a root mean square good up to 30 N m,
+    and bad above 50 N m. Hicks and others advise a much lower limit (2015, Is my model good
+    enough?, https://doi.org/10.1115/1.4029304): 1 % of the largest external force times the height
+    of the mass centre. A peak between this limit and OpenSim's is okay.
 
     Most of the mass is in the trunk, and its mass centre is hard to measure. A residual moment
     shows that this mass centre is wrong, or that the loads act in another place.

@@ -257,10 +257,11 @@ def report_swapped_feet(trial: Trial, report: FindingCollector) -> None:
 def report_measured_weight(trial: Trial, report: FindingCollector) -> None:
     """The mass of the model differs from the measured weight.
 
-    Compares the mass of the model with the mean vertical force of all loads, divided by gravity and
-    the mean vertical acceleration of the mass centre, while at least one foot stands on a plate. A
-    difference of more than 5 % of the weight exceeds the largest residual force that Hicks and
-    others recommend (2015, Is my model good enough?, https://doi.org/10.1115/1.4029304).
+    Compares the mass of the model with the measured mass. This is the mean vertical force of all
+    loads, divided by the sum of gravity and the mean vertical acceleration of the mass centre. The
+    means run from the first to the last time at which a foot stands on a plate. A difference of
+    more than 5 % of the weight exceeds the largest residual force that Hicks and others recommend
+    (2015, Is my model good enough?, https://doi.org/10.1115/1.4029304).
 
     All the time, a residual force makes up for the difference, and the leg moments belong to
     another person. A missing plate, or a wrong calibration, has the same effect.

@@ -25,8 +25,8 @@ def _list_wraps(path: GeometryPath) -> list[PathWrap]:
 def report_swallowed_point(subject: Subject, report: FindingCollector) -> None:
     """A point of a path lies inside a surface that the path wraps around.
 
-    Reports points that are fixed to the body of a cylinder (taken as infinitely long), a sphere or
-    an ellipsoid, inside it and within the `range` of the wrap.
+    Reports points inside a cylinder (taken as infinitely long), a sphere or an ellipsoid that is
+    fixed to the same body. Only points within the `range` of the wrap count.
 
     OpenSim does not wrap a segment that begins or ends inside the surface. The path goes straight
     through it, in every pose and without a message. The point may be inside by less than a
