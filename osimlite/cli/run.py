@@ -130,7 +130,7 @@ def run(
         # The report must not replace a file that it describes.
         if any(find_inputs([report], setup) for setup in files):
             raise SettingError(
-                f"--report would replace '{report}', which the results come from; give it another name"
+                f"--report would replace '{report}', a setup or one of its input files; give the report another name"
             )
     # One setup is shown in full; several get a row each.
     if len(files) == 1 and not as_json and not (resume or cluster):

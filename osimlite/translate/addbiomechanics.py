@@ -171,7 +171,7 @@ class SubjectFolder:
                     "joint",
                     f"/passes/{name}/model",
                     "what Nimble computes differently with this model",
-                    "the model is used as it is",
+                    "the model is used unchanged",
                     error.message,
                 )
                 continue

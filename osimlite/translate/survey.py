@@ -219,7 +219,7 @@ class _Survey:
                 self.note(
                     "ball-joint",
                     path,
-                    "a ball joint: three rotations at once, whose speeds are an angular velocity",
+                    "a ball joint: three rotations, whose speeds are the components of the angular velocity",
                     "three revolute joints: singular where the second angle is +-90 degrees; their speeds are the "
                     "rates of the angles",
                 )

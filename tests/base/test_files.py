@@ -240,7 +240,7 @@ def test_files_that_name_each_other_deeply(tmp_path: Path) -> None:
         "</OpenSimDocument>"
     )
     done = run("validate", "m.osim", "--format", "concise", "--no-cache", folder=tmp_path)
-    assert "files name each other too deeply" in done.out
+    assert "too many levels of files that refer to each other" in done.out
 
 
 MESSY = '<OpenSimDocument Version="40600"><Model name="m"><gravity>0  -5 0</gravity ></Model></OpenSimDocument>'

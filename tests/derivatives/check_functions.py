@@ -321,7 +321,9 @@ def test_a_linearization_is_that_of_the_functions():
     assert near.B[:, 0].any() and near.B.shape[1] == len(f.controls)
     with pytest.raises(osimlite.OsimliteError, match="has no control 'knee'"):
         osimlite.linearize(f, None, {"knee": 1.0})
-    with pytest.raises(osimlite.OsimliteError, match="states, not 1"):
+    with pytest.raises(
+        osimlite.OsimliteError, match="values, one for each state of the model; got 1"
+    ):
         osimlite.linearize(f, [1.0])
 
 

@@ -110,8 +110,8 @@ def test_what_is_refused(tmp_path):
     for text, line, words in (
         ("v 0 0 0\nv 0 one 0\n", 2, "this is not a point"),
         ("v 0 0 0\nf 1 x 1\n", 2, "this is not a face"),
-        ("v 0 0 0\nf 1 2 3\n", None, "a face names a point that is not there"),
-        ("v 0 0 nan\nf 1 1 1\n", None, "not three finite numbers"),
+        ("v 0 0 0\nf 1 2 3\n", None, "a face refers to a point that the file does not contain"),
+        ("v 0 0 nan\nf 1 1 1\n", None, "does not consist of three finite numbers"),
         ("nothing\n", None, "not an OBJ file with faces"),
     ):
         (tmp_path / "bad.obj").write_text(text)

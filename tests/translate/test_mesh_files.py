@@ -120,7 +120,7 @@ def test_text_stl_becomes_binary_which_bullet_reads(bones):
     ],
 )
 def test_damaged_stl_files_are_refused(content):
-    with pytest.raises(OsimliteError, match=r"bone\.stl: .*save it again"):
+    with pytest.raises(OsimliteError, match=r"bone\.stl: .*save the mesh again"):
         format_binary_stl(content, "bone.stl")
 
 

@@ -70,7 +70,7 @@ _MIN_INCLUDED_BYTES = 100_000
 
 _MAX_INCLUDE_DEPTH = 20
 """Largest depth of files that include each other."""
-_TOO_DEEP_MESSAGE = "is not read: files name each other too deeply"
+_TOO_DEEP_MESSAGE = "is not read: too many levels of files that refer to each other"
 
 _UNKNOWN_KINDS = frozenset(("unknown-tag", "unknown-class", "wrong-class"))
 
@@ -440,7 +440,7 @@ def _make_include_reader(
         path = os.path.realpath(include_path)
         if path in around:
             # A file that includes itself, directly or through others.
-            return "is being read already"
+            return "refers back to itself, directly or through other files"
         if len(around) == _MAX_INCLUDE_DEPTH:
             return _TOO_DEEP_MESSAGE
         try:

@@ -76,12 +76,17 @@ def _parse_lines(content: bytes, name: str) -> tuple[Polygons, Array | None, Ind
                 f"this is not a {'point' if kind == 'v' else 'face'}", file=name, line=number
             ) from None
     if not corners:
-        raise OsimliteError("it is not an OBJ file with faces; save it again", file=name)
+        raise OsimliteError("it is not an OBJ file with faces; save the mesh again", file=name)
     if max(corners) >= len(points):
-        raise OsimliteError("a face names a point that is not there; save it again", file=name)
+        raise OsimliteError(
+            "a face refers to a point that the file does not contain; save the mesh again",
+            file=name,
+        )
     result = np.array(points)
     if not np.isfinite(result).all():
-        raise OsimliteError("a point is not three finite numbers; save it again", file=name)
+        raise OsimliteError(
+            "a point does not consist of three finite numbers; save the mesh again", file=name
+        )
     polygons = Polygons(result, np.array(corners, dtype=np.int64), np.array(ends, dtype=np.int64))
     if len(corner_normals) < len(corners) or max(corner_normals) >= len(normals):
         return polygons, None, polygons.corners

@@ -75,7 +75,7 @@ def _read_binary(content: bytes, name: str) -> _Triangles | None:
 def _read_text_corners(content: bytes, name: str) -> Array:
     """Return the corners (t, 3, 3) of the triangles of a text STL file."""
     if content.lstrip()[:5].lower() != b"solid":
-        raise OsimliteError("it is not an STL file, or is cut off; save it again", file=name)
+        raise OsimliteError("it is not an STL file, or is cut off; save the mesh again", file=name)
     numbers = np.array(_CORNER.findall(content + b"\n"), dtype="S").astype(np.float64)
     corner_count = len(re.findall(rb"\bvertex\b", content, re.IGNORECASE))
     if (
@@ -84,14 +84,16 @@ def _read_text_corners(content: bytes, name: str) -> Array:
         or len(numbers) != corner_count
         or b"endsolid" not in content.lower()
     ):
-        raise OsimliteError("its triangles are damaged or cut off; save it again", file=name)
+        raise OsimliteError("its triangles are damaged or cut off; save the mesh again", file=name)
     _require_finite(numbers, name)
     return numbers.reshape(-1, 3, 3)
 
 
 def _require_finite(numbers: Array, name: str) -> None:
     if not np.isfinite(numbers).all():
-        raise OsimliteError("a corner is not three finite numbers; save it again", file=name)
+        raise OsimliteError(
+            "a corner does not consist of three finite numbers; save the mesh again", file=name
+        )
 
 
 def _from_text(content: bytes, name: str) -> _Triangles:

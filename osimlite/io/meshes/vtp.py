@@ -109,7 +109,7 @@ def _name_errors(name: str) -> Iterator[None]:
             yield
     except _Unreadable as problem:
         raise OsimliteError(
-            f"{problem}; save it again as PolyData (.vtp) or as .obj", file=name
+            f"{problem}; save the mesh again as PolyData (.vtp) or as .obj", file=name
         ) from None
 
 
@@ -222,7 +222,7 @@ class _File:
         # Corners beyond the last cell are ignored.
         corners = corners[: ends[-1]]
         if len(corners) and not 0 <= corners.min() <= corners.max() < count:
-            raise _Unreadable(f"its {tag} name points that are not there")
+            raise _Unreadable(f"its {tag} refer to points that the file does not contain")
         return corners, ends
 
     def _read_normals(self, piece: etree._Element, count: int) -> Array | None:

@@ -127,7 +127,7 @@ def _read_points(
     y = tuple(function.y)[: len(x)]
     if len(x) != len(y) or len(x) < least:
         raise _Impossible(
-            f"it has {len(x)} x and {len(y)} y; give as many of both, at least {least}"
+            f"it has {len(x)} x values and {len(y)} y values; give the same number of both, at least {least}"
         )
     if not all(map(isfinite, (*x, *y))):
         raise _Impossible("a point is not finite; give numbers")

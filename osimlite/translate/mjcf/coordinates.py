@@ -73,7 +73,7 @@ def add_coordinates(draft: MjcfDraft) -> None:
             note(
                 "speeds",
                 draft.tree.path_of(joint) or "",
-                "three rotations at once, whose speeds are an angular velocity",
+                "a joint with three rotations, whose speeds are the components of its angular velocity",
                 "three hinges with the same coordinates; their speeds are the rates of the coordinates; "
                 "singular in the same poses as in OpenSim",
             )

@@ -233,4 +233,6 @@ def start_draft(path: Path, options: ImportOptions) -> ConversionDraft:
 def _record_warnings(fidelity: Fidelity, texts: Iterable[str]) -> None:
     """Record the warnings of MuJoCo."""
     for text in texts:
-        fidelity.add("warning", "/model", "a model that MuJoCo warns of", "used as it is", text)
+        fidelity.add(
+            "warning", "/model", "a model about which MuJoCo warns", "used unchanged", text
+        )

@@ -248,7 +248,7 @@ def _make_special_joint(
     draft.record(
         "joint",
         joint,
-        "a quaternion, and speeds that are an angular velocity",
+        "a quaternion, with the components of the angular velocity as speeds",
         "three body-fixed X-Y-Z angles, which are 0 at the default orientation; poses are the "
         "same, but the angles are singular where the second is 90 degrees",
         "coordinates " + " ".join(draft.coordinates[joint]),

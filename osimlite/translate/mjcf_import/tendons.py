@@ -407,7 +407,7 @@ class _Selection:
                 draft.record(
                     "tendon",
                     tendon.number,
-                    f"the way around a geom by the rules of MuJoCo {self.version}",
+                    f"the path around a geom by the rules of MuJoCo {self.version}",
                     "a Scholz2015GeometryPath over contact surfaces",
                     errors=errors,
                 )
@@ -416,7 +416,7 @@ class _Selection:
                 draft.record(
                     "tendon",
                     tendon.number,
-                    f"the way around a geom by the rules of MuJoCo {self.version}",
+                    f"the path around a geom by the rules of MuJoCo {self.version}",
                     "a GeometryPath whose wrap surfaces have the best-fitting quadrant",
                     "quadrants " + " ".join(used_quadrants),
                     errors,

@@ -62,7 +62,8 @@ def test_strips_are_cut_into_triangles_that_face_outwards(fixtures):
 
 def test_a_compression_that_is_not_known_is_named(fixtures):
     with pytest.raises(
-        OsimliteError, match=r"lz4\.vtp: it is compressed by vtkLZ4DataCompressor.*save it again"
+        OsimliteError,
+        match=r"lz4\.vtp: it is compressed by vtkLZ4DataCompressor.*save the mesh again",
     ):
         read_vtp((fixtures / "meshes" / "binary-lz4.vtp").read_bytes(), "lz4.vtp")
 
@@ -171,7 +172,7 @@ def test_a_damaged_file_is_read_or_refused_in_one_sentence(fixtures, data):
     except OsimliteError as error:
         assert (
             str(error).startswith("damaged.vtp: ")
-            and "save it again" in str(error)
+            and "save the mesh again" in str(error)
             and "\n" not in str(error)
         )
     else:
@@ -191,7 +192,7 @@ def test_a_damaged_file_is_read_or_refused_in_one_sentence(fixtures, data):
             Writer("ascii", "", "UInt32", "LittleEndian").file(
                 [(CUBE[:4], SIDES)], "Float32", "Int32"
             ),
-            "not there",
+            "does not contain",
         ),
         (
             Writer("ascii", "", "UInt32", "LittleEndian").file(

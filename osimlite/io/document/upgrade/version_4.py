@@ -164,9 +164,7 @@ def convert_controller_actuators(draft: Draft) -> None:
         if any(word.lower() == "all" for word in words):
             paths = [path for path, _ in actuators]
             if draft.model is None:
-                lost = (
-                    "that it drives all actuators, which a document without the model cannot name"
-                )
+                lost = "the control of all actuators, because a document without the model cannot name them"
         else:
             paths = [by_name.get(word, f"/forceset/{word}") for word in words]
             known_paths = [path for path in paths if path in {*by_name.values()}]
