@@ -70,7 +70,7 @@ def report_made_up_coordinate(subject: Subject, report: FindingCollector) -> Non
 
 @rule("OSIM412", "axis-without-coordinate", severity=ERROR, consequences=(REFUSES,))
 def report_axis_without_coordinate(subject: Subject, report: FindingCollector) -> None:
-    """An axis of a custom joint has a function and no coordinate for it.
+    """An axis of a custom joint has a function, but no coordinate for it.
 
     Reports axes that name no coordinate although their function needs a variable. Constant and
     linear functions need none.

@@ -266,7 +266,7 @@ def report_gimbal_lock(subject: Subject, report: FindingCollector) -> None:
     The joint loses one direction of rotation, and the mass matrix is singular. Every acceleration
     of the model is NaN, or beyond 1e12 rad/s^2 because of rounding, even if the coordinates are
     locked. Inverse kinematics works, but the first and the third angle are arbitrary. Change the
-    default value by 0.001 rad, or use a BallJoint, which has no gimbal lock.
+    default value of the second angle by 0.001 rad, or use a BallJoint, which has no gimbal lock.
 
     ```xml
       <Body name="foot"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>

@@ -217,8 +217,8 @@ def report_closing_tag(subject: Subject, report: FindingCollector) -> None:
 
     Reports closing tags such as `</mass >`, and closing tags that span two lines.
 
-    XML allows it, so editors and other programs accept it. OpenSim's parser does not, and cannot
-    load the file.
+    XML allows this, so editors and other programs accept it. OpenSim's parser does not accept it,
+    and OpenSim cannot load the file.
 
     ```xml
     - <Body name="thigh"> <mass>8</mass > <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>

@@ -296,7 +296,8 @@ def report_no_direction(subject: Subject, report: FindingCollector) -> None:
     """A direction vector is zero.
 
     Reports lines, axes and directions of constraints and actuators that are 0 0 0. The default line
-    of a PointOnLineConstraint is zero. For an actuator with `appliesForce` false it is a warning.
+    of a PointOnLineConstraint is zero. For an actuator with `appliesForce` false, the finding is a
+    warning.
 
     OpenSim normalises the direction to NaN, whatever the force: every acceleration is NaN, without
     a message.

@@ -25,7 +25,7 @@ def report_control_function_count(subject: Subject, report: FindingCollector) ->
     their controls from a file are not checked.
 
     The first function drives the first actuator, and so on; names do not matter. OpenSim rejects
-    the model where the numbers differ.
+    the model if the numbers differ.
 
     ```xml
       <CoordinateActuator name="motor"> <coordinate>knee_angle</coordinate> </CoordinateActuator>
