@@ -252,18 +252,17 @@ def write_results(
     return [folder / path.name for path in paths]
 
 
+CONTACT_CLASSES = {"HuntCrossleyForce", "ElasticFoundationForce"}
+"""Forces with a stiffness in `contact_parameters`; by name, so that no model imports both classes."""
+
+
 def _find_soft_contacts(model: Model) -> list[str]:
     """Return the names of the contact forces that act with a stiffness of 0."""
-    from osimlite.schema.contact_forces import ElasticFoundationForce
-    from osimlite.schema.forces import HuntCrossleyForce
-
     return [
         f"'{force.name}'"
-        for force in (
-            *model.components(HuntCrossleyForce),
-            *model.components(ElasticFoundationForce),
-        )
-        if force.appliesForce
+        for force in model.components()
+        if type(force).__name__ in CONTACT_CLASSES
+        and force.appliesForce
         and any(item.stiffness == 0.0 for item in force.contact_parameters.objects)
     ]
 
