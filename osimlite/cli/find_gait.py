@@ -124,17 +124,18 @@ def _describe_result(gait: Gait) -> FactTable:
 
     cycle, walk = gait.model_cycle.cycle, gait.walk
     stable = "stable" if cycle.largest < 1.0 else "not stable"
-    facts = FactTable(f"{stable}: largest multiplier {cycle.largest:.4g}")
+    facts = FactTable(f"{stable}: largest Floquet multiplier {cycle.largest:.4g}")
     for name, number in gait.model_cycle.numbers.items():
         facts.add(name, f"{number:.6g}")
     facts.add("step length", f"{cycle.length:.6g} m")
     facts.add("period", f"{cycle.period:.6g} s")
-    end = "walking" if walk.walks else f"{walk.ending} {walk.fell_on}".strip()
+    end = "still walking" if walk.walks else f"{walk.ending} {walk.fell_on}".strip()
     counts = f"{format_count(len(walk.steps), 'step')}, {format_count(len(walk.scuffs), 'scuff')}"
     facts.add("walk", f"{counts}; {end} after {walk.end:.4g} s")
     facts.add(
-        "near it",
-        f"{round(BASIN_STARTS * gait.model_cycle.walking)} of {BASIN_STARTS} starts make {BASIN_STEPS} steps",
+        "perturbed",
+        f"{round(BASIN_STARTS * gait.model_cycle.walking)} of {BASIN_STARTS} initial states near the cycle "
+        f"lead to {BASIN_STEPS} steps",
     )
     facts.add(
         "search",

@@ -286,9 +286,12 @@ def _describe_cycle(result: GaitReport, files: Sequence[Path]) -> FactTable:
 
     walk, cycle = result.walk, result.cycle
     facts = FactTable(result.model)
+    # The ending without a fall is "walking".
     end = (
         f"fell on {walk.fell_on} after {walk.end:.4g} s"
         if walk.fell_on
+        else f"still walking after {walk.end:.4g} s"
+        if walk.ending == "walking"
         else f"{walk.ending} after {walk.end:.4g} s"
     )
     facts.add(
@@ -309,7 +312,7 @@ def _describe_cycle(result: GaitReport, files: Sequence[Path]) -> FactTable:
                 "scuffs", f"{cycle.scuffs} in each {'stride' if cycle.per_stride else 'step'}"
             )
         stable = "stable" if cycle.largest < 1.0 else "not stable"
-        facts.add("stability", f"{stable}: largest multiplier {cycle.largest:.4g}")
+        facts.add("stability", f"{stable}: largest Floquet multiplier {cycle.largest:.4g}")
         # Large eigenvalues decide about stability; of high-dimensional models only the first six
         # are shown.
         sizes = ", ".join(f"{size:.3g}" for size in abs(cycle.multipliers[:6]))
@@ -321,13 +324,14 @@ def _describe_cycle(result: GaitReport, files: Sequence[Path]) -> FactTable:
     for neighbourhood in result.nearby:
         facts.add(
             f"within {neighbourhood.part:.0%}",
-            f"{neighbourhood.walked} of {neighbourhood.starts} starts make {neighbourhood.steps} steps",
+            f"{neighbourhood.walked} of {neighbourhood.starts} initial states near the cycle lead to "
+            f"{neighbourhood.steps} steps",
         )
     if result.basin is not None:
         basin = result.basin
         facts.add(
             "basin",
-            f"{basin.part:.0%} of {basin.steps.size} starts make {basin.target_steps} steps",
+            f"{basin.part:.0%} of {basin.steps.size} initial states lead to {basin.target_steps} steps",
         )
     for skipped in summarize_skipped(result.skipped):
         facts.add("left out", skipped)

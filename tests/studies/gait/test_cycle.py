@@ -206,7 +206,10 @@ def test_the_command(tmp_path, monkeypatch):
     words = "gait steady-walker --to 5 --perturb 0.05 --starts 4 --steps 3 --basin --grid 2 --reach 0.01 --no-pictures"
     done = CliRunner().invoke(create_app(["gait"]), [*words.split(), "-o", "."])
     assert done.exit_code == 0, done.output
-    assert "6 steps, 0 scuffs" in done.output and "stable: largest multiplier 0.56" in done.output
+    assert (
+        "6 steps, 0 scuffs" in done.output
+        and "stable: largest Floquet multiplier 0.56" in done.output
+    )
     assert max(len(line) for line in done.output.splitlines()) <= 80
     facts = json.loads((tmp_path / "gait.json").read_text())
     assert facts["cycle"]["step_length_m"] == pytest.approx(0.624382, abs=1e-6)

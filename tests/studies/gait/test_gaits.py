@@ -281,7 +281,7 @@ def test_the_command_writes_a_walker(tmp_path):
     done = CliRunner().invoke(
         create_app(["find-gait"]), ["find-gait", "dynamic-walker", *words, *options]
     )
-    assert "largest multiplier" in done.output and done.exit_code in (0, 1)
+    assert "largest Floquet multiplier" in done.output and done.exit_code in (0, 1)
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert summary["settings"]["seed"] == 0 and {*summary["numbers"]} == {INERTIA, AHEAD}
     heads, *rows = (tmp_path / "cycles.csv").read_text().splitlines()
