@@ -28,7 +28,7 @@ _PLAIN = (
     ),
     (
         r"Extra content at the end of the document",
-        "something follows after the root element has ended",
+        "there is content after the root element",
     ),
     (r"Specification mandates value for attribute (\S+)", r"the attribute \1 has no value"),
     (r"AttValue: \" or ' expected", "the value of an attribute must be in quotes"),

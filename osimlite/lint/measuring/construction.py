@@ -143,12 +143,12 @@ class _Construction:
                 if component is not None
                 else f"'{path}'"
             )
-            size = f"{distance:.3g}" if isfinite(distance) else "an unknown amount"
-            suffix = "" if len(error.errors) == 1 else f", with {len(error.errors) - 1} others"
+            size = f"{distance:.3g} (m or rad)" if isfinite(distance) else "an unknown amount"
+            suffix = "" if len(error.errors) == 1 else f" and {len(error.errors) - 1} more"
             yield Obstacle(
                 Stage.ASSEMBLY,
                 path,
-                f"no pose near the default one fulfils {name}{suffix}: the best is off by {size}",
+                f"no pose near the default pose fulfils {name}{suffix}; the nearest pose is off by {size}",
             )
 
     def find_clamps(self, mechanism: Mechanism, q: Array) -> Iterator[Obstacle]:
@@ -163,7 +163,7 @@ class _Construction:
                         Stage.CLAMP,
                         info.path,
                         f"the prescribed_function of '{info.name}' starts at {value:.6g}, outside "
-                        f"the range {low:.6g} to {high:.6g} that it is clamped to",
+                        f"its clamped range, {low:.6g} to {high:.6g}",
                     )
         for index in find_unclamped(mechanism, q):
             info = mechanism.coordinates[index]
@@ -174,8 +174,8 @@ class _Construction:
             yield Obstacle(
                 Stage.CLAMP,
                 info.path,
-                f"the constraints take '{info.name}' to {q[index]:.6g}, outside the range "
-                f"{low:.6g} to {high:.6g} that it is clamped to",
+                f"the constraints take '{info.name}' to {q[index]:.6g}, outside its clamped "
+                f"range, {low:.6g} to {high:.6g}",
             )
 
     # ------------------------------------------------------------------------------ accelerations
@@ -235,8 +235,8 @@ class _Construction:
                 yield Obstacle(
                     Stage.RATE,
                     owner,
-                    f"the rate of {name} of {owner_description} is not finite where the model starts: "
-                    "OpenSim's integrator stops there unless muscles are equilibrated first",
+                    f"the rate of {name} of {owner_description} is not finite at the start: "
+                    "OpenSim's integrator stops there, unless the muscles are put into equilibrium first",
                 )
 
     def describe_inertia(self, system: System, state: list[float]) -> Obstacle:
@@ -265,8 +265,8 @@ class _Construction:
             yield Obstacle(
                 Stage.ACCELERATION,
                 element.path,
-                f"{kind} '{element.path.rpartition('/')[2]}' gives no finite number in the "
-                "default pose, so every acceleration is NaN or infinite",
+                f"{kind} '{element.path.rpartition('/')[2]}' computes no finite number in the "
+                "default pose: every acceleration is NaN or infinite",
             )
 
     # ------------------------------------------------------------------------------------ helpers

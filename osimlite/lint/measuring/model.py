@@ -31,7 +31,7 @@ from osimlite.simulation.engines.machine_code import has_machine_code
 from osimlite.simulation.paths import Paths
 
 NEEDS_MACHINE_CODE = (
-    "so many wrap surfaces take minutes in Python: install osimlite where a C++ compiler is "
+    "with this many wrap surfaces, the measurements take minutes in Python: install osimlite where a C++ compiler is "
     "found, or run: pip install 'osimlite[jit]'"
 )
 """Reason why paths around many surfaces are not measured."""
