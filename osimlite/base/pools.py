@@ -169,7 +169,8 @@ def _report_lost_workers() -> Iterator[None]:
     except BrokenExecutor:
         # New processes import the main module of the program again.
         raise WorkerLostError(
-            "a process of the sweep has ended; in a script, start the sweep under if __name__ == '__main__':, and "
+            "a worker process of the sweep has ended unexpectedly; in a script, start the sweep under if "
+            "__name__ == '__main__':, and "
             "continue an interrupted sweep with --resume"
         ) from None
 
@@ -271,7 +272,7 @@ class ClusterPool:
             except KilledWorker:
                 if losses + 1 >= MAX_TASK_LOSSES:
                     raise OsimliteError(
-                        f"a task has ended {MAX_TASK_LOSSES} workers; read their logs, then continue with --resume"
+                        f"a task crashed {MAX_TASK_LOSSES} workers; read their logs, then continue with --resume"
                     ) from None
                 self._submit_task(tag, values, losses + 1)
             except (CancelledError, OSError, TimeoutError):

@@ -52,7 +52,7 @@
         !coordinates[c].still && this.over(c, FEW).some(({ arm }) => Math.abs(arm) > NOTHING));
       this.charts = crossed.map((c) => this.chart(c, this.over(c, every)));
       $("#curves div").replaceChildren(...this.charts.map(({ element }) => element));
-      if (!crossed.length) $("#curves div").textContent = "It crosses no coordinate that is free.";
+      if (!crossed.length) $("#curves div").textContent = "This path crosses no coordinate that can move.";
       this.mark();
     }
 

@@ -370,6 +370,6 @@
     window.osimlite.ready = true;
   } catch (error) {
     if (/WebGL/.test(error.message)) failed("This browser cannot draw in three dimensions (WebGL is off). 'osimlite view --screenshot' needs no browser.");
-    else { failed(`The page could not be made: ${error.message}`); throw error; }
+    else { failed(`The page could not be shown: ${error.message}`); throw error; }
   }
 })();

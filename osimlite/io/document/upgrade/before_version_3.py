@@ -409,7 +409,7 @@ def convert_external_forces(draft: Draft) -> None:
                 draft.record_refusal(
                     loads,
                     force,
-                    f"{force.tag} is not known among ExternalLoads of a version before 20301",
+                    f"ExternalLoads of versions before 20301 cannot contain the class {force.tag}",
                 )
                 continue
             body = force.find("body")

@@ -60,7 +60,7 @@ def _check_values(draft: Draft) -> None:
                             draft.record_refusal(
                                 owner,
                                 element,
-                                f"<{element.tag}> must be {words} and holds elements or comments",
+                                f"<{element.tag}> must contain {words} only, but contains elements or comments",
                             )
                         elif not is_readable(get_text(element)):
                             draft.record_refusal(
@@ -97,7 +97,9 @@ def _check_bodies(draft: Draft) -> None:
                 draft.record_refusal(body, children[0], f"<{children[0].tag}> has no <parent_body>")
             elif not _is_value(parent):
                 draft.record_refusal(
-                    body, parent, "<parent_body> must be a name and holds elements or comments"
+                    body,
+                    parent,
+                    "<parent_body> must contain a name only, but contains elements or comments",
                 )
 
 
@@ -112,7 +114,9 @@ def _check_connectors(draft: Draft, component: Element) -> None:
             )
         elif connectee is None or not _is_value(connectee):
             draft.record_refusal(
-                component, connector, f"<{connector.tag}> has no <connectee_name> with a name in it"
+                component,
+                connector,
+                f"<{connector.tag}> has no <connectee_name> that contains a name",
             )
 
 
