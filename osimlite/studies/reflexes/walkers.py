@@ -246,7 +246,7 @@ class SensedModel:
             base = parents.get(upper_body, "")
             if base not in names:
                 raise ModelError(
-                    f"the body '{upper_body}' has no parent body, so it cannot belong to a leg"
+                    f"the body '{upper_body}' must be attached to another body, such as the pelvis, to be part of a leg"
                 )
             legs.append(
                 Leg(side, names.index(base), names.index(foot), pairs[f"{contact}{side}"], length)
