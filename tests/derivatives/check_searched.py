@@ -105,7 +105,7 @@ def test_wrapped_paths_are_those_of_the_kernels():
 
 def test_what_depends_on_the_way_is_no_parameter(tmp_path):
     model = jumper()
-    with pytest.raises(UnsupportedError, match=r"cannot stay a symbol|cannot be a parameter"):
+    with pytest.raises(UnsupportedError, match=r"cannot be a symbol|cannot be a parameter"):
         osimlite.casadi(model, parameters=["/bodyset/femur_l/wrapobjectset/knee_l/radius"])
     with pytest.raises(UnsupportedError, match="paths=polynomial"):
         osimlite.casadi(model).save(tmp_path / "saved")

@@ -116,7 +116,7 @@ def test_a_search_arrives(tmp_path):
 @pytest.mark.parametrize(
     ("choices", "message"),
     [
-        ({"integrator": "rosenbrock"}, "Merson's steps"),
+        ({"integrator": "rosenbrock"}, "integrator 'merson'"),
         ({"below": {"Pelvis_ty": 0.1}}, "remove --below"),
         ({"measures": ("steps",)}, "depends on events"),
     ],

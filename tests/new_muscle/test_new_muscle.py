@@ -91,7 +91,7 @@ def test_the_linter_knows_its_domains(file):
             "OSIM207",
             "expected 0 to 0",
         ),
-        ("<width>0.1</width>", "OSIM209", "its grip is above 1 + width: OpenSim rejects the model"),
+        ("<width>0.1</width>", "OSIM209", "its grip is above 1 + width; OpenSim rejects the model"),
     ):
         every = findings(file, "<grip>1.2</grip>", f"<grip>1.2</grip>{new}")
         # OSIM531 also reports a time constant that is not positive, because osimlite cannot

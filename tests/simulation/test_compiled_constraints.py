@@ -353,7 +353,7 @@ def test_a_function_that_is_unknown_is_refused_by_name():
             return arguments[0], np.ones(1), np.zeros((1, 1))
 
     mechanism = build_mechanism(four_bars())
-    with pytest.raises(UnsupportedError, match="the function of '/constraintset/odd' is a Odd"):
+    with pytest.raises(UnsupportedError, match="the function of '/constraintset/odd' is an Odd"):
         CompiledEngine(
             replace(mechanism, constraints=(Coupler(0, (1,), Odd(), "/constraintset/odd"),)),
             Forces(()),

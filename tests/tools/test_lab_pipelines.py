@@ -96,7 +96,7 @@ def test_given_forces_that_end_early_are_told(tmp_path: Path) -> None:
     osimlite.run(folder / "so.xml")
     change(folder / "jr.xml", ("<final_time>0.4<", "<final_time>0.5<"))
     with pytest.warns(
-        DoubtfulWarning, match=r"forces of 'so_StaticOptimization_force.sto' .* from 0.2 to 0.4 s"
+        DoubtfulWarning, match=r"forces of 'so_StaticOptimization_force.sto' .* 0.2 to 0.4 s"
     ):
         osimlite.run(folder / "jr.xml")
 
