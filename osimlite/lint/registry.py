@@ -109,7 +109,11 @@ class FindingCollector:
             named = location.get("word") or (
                 item and getattr(item, location.get("attribute") or location.get("tag") or "name")
             )
-            fix = fix or subject.make_replacement(at, named, suggestion, certain=certain)
+            if suggestion == named:
+                # The text is correct; what it refers to is wrong.
+                suggestion = None
+            else:
+                fix = fix or subject.make_replacement(at, named, suggestion, certain=certain)
         elif subject.upgraded:
             # Findings on an upgraded document may not match its text.
             fix = None

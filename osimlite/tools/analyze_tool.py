@@ -80,7 +80,12 @@ def run_analyze_tool(job: Job, outcome: Outcome) -> None:
         times, result = np.array([t for t, _ in moments]), np.array([y for _, y in moments])
         unbalanced: dict[str, BoolArray] = {}
         if setup.solve_for_equilibrium_for_auxiliary_states:
-            unbalanced = equilibrate_rows(outcome, simulation, times, result)
+            affects_results = {type(analysis).__name__ for analysis, _ in analyses} != {
+                "StaticOptimization"
+            }
+            unbalanced = equilibrate_rows(
+                outcome, simulation, times, result, affects_results=affects_results
+            )
         motion = Motion(
             model,
             simulation,
@@ -95,7 +100,12 @@ def run_analyze_tool(job: Job, outcome: Outcome) -> None:
 
 
 def equilibrate_rows(
-    outcome: Outcome, simulation: Simulation, times: Array, states: Array
+    outcome: Outcome,
+    simulation: Simulation,
+    times: Array,
+    states: Array,
+    *,
+    affects_results: bool,
 ) -> dict[str, BoolArray]:
     """Equilibrate the muscles at every time, and report muscles without equilibrium.
 
@@ -108,6 +118,7 @@ def equilibrate_rows(
         simulation: simulation of the model, whose engine computes the equilibria.
         times: times (t,), s.
         states: states (t, y), changed in place.
+        affects_results: whether an analysis uses states of muscles; StaticOptimization does not.
 
     Returns:
         Masks (t,) of the times without equilibrium, by path of the muscle; only muscles that lack one
@@ -124,6 +135,11 @@ def equilibrate_rows(
             reasons.setdefault(path, reason)
             unbalanced.setdefault(path, np.zeros(len(times), dtype=bool))[row] = True
     elements = {element.path: element for element in simulation.forces.elements}
+    consequence = (
+        "Values that depend on the fibers or the force of this muscle are NaN at these times"
+        if affects_results
+        else "StaticOptimization does not use the equilibrium, so its results are not affected"
+    )
     for path, missing in unbalanced.items():
         element = elements[path]
         # Muscles without states of their own have nothing to mark; their records become NaN below.
@@ -133,8 +149,7 @@ def equilibrate_rows(
         outcome.add_message(
             "no equilibrium",
             f"{reasons[path]}. This concerns {np.count_nonzero(missing)} of {len(times)} times, "
-            f"{_describe_spans(times, missing)}. Values that depend on the fibers or the force of this muscle are "
-            "NaN at these times",
+            f"{_describe_spans(times, missing)}. {consequence}",
         )
     outcome.summary["without_equilibrium"] = {
         path: times[missing].tolist() for path, missing in unbalanced.items()

@@ -227,12 +227,12 @@ class TrackingTasks:
             # As in OpenSim, `on` has no effect.
             if not task.active[0]:
                 continue
-            for name in (task.name, str(task.coordinate)):
+            # The name of a task selects the desired motion, `coordinate` the coordinate that follows it.
+            for property_name, name in (("name", task.name), ("coordinate", str(task.coordinate))):
                 if name not in names:
-                    suggestion = suggest_name(name, names)
                     raise job.create_error(
-                        f"the task '{task.name}' of '{path}' names an unknown coordinate "
-                        f"'{name}'{suggestion}"
+                        f"the {property_name} of the task '{task.name}' of '{path}' must be that of a "
+                        f"coordinate; there is no coordinate '{name}'{suggest_name(name, names)}"
                     )
             weight, kp, kv, ka = (
                 float(getattr(task, property_name)[0])

@@ -454,3 +454,14 @@ def test_a_text_whose_root_tag_is_damaged_gets_a_syntax_error(tmp_path, start):
         "</OpenSimDocument>"
     )
     assert "OSIM001" in {finding.code for finding in run_rules(load_subject(str(path)))}
+
+
+def test_a_correct_identifier_is_not_suggested_if_a_label_is_wrong(fixtures, project):
+    """The table lacks one of three columns: no spelling of the identifier is correct."""
+    text = (fixtures / "lint" / "OSIM843" / "pass-columns.xml").read_text().replace("../", "")
+    (project / "loads.xml").write_text(text)
+    assert not validate(project / "loads.xml", select="OSIM843").findings
+    table = project / "leg_grf.mot"
+    table.write_text(table.read_text().replace("ground_force_vy", "ground_force_y"))
+    (finding,) = validate(project / "loads.xml", select="OSIM843").findings
+    assert (finding.suggestion, finding.fix) == (None, None)

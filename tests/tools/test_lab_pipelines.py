@@ -382,3 +382,18 @@ def test_paths_without_a_quantity_are_told_as_opensim_reads_them(
     result = osimlite.run(folder / setup)
     (said,) = [item.message for item in result.warnings if item.code == "OSIM842"]
     assert "OpenSim looks for names or for paths that end with '/value', and uses 0" in said
+
+
+@pytest.mark.parametrize(
+    ("setup", "consequence"),
+    [("so.xml", "its results are not affected"), ("ma.xml", "are NaN at these times")],
+)
+def test_the_consequence_of_a_missing_equilibrium_is_that_of_the_analysis(
+    tmp_path: Path, setup: str, consequence: str
+) -> None:
+    folder = copy_lab("unbalanced", tmp_path)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DoubtfulWarning)
+        result = osimlite.run(folder / setup)
+    messages = [message for name, message in result.messages if name == "no equilibrium"]
+    assert messages and all(consequence in message for message in messages)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
@@ -53,7 +54,9 @@ def report_load_columns(setup: Setup, report: FindingCollector) -> None:
     """
     for loads, table in setup.iterate_with_tables(setup.find_by_class("ExternalLoads"), "datafile"):
         columns = table.columns
-        prefixes = sorted({column[:-1] for column in columns if column[-1:] in "xyzXYZ"})
+        prefix_counts = Counter(column[:-1] for column in columns if column[-1:] in "xyzXYZ")
+        # Prefixes of three columns, which would be correct identifiers.
+        complete_prefixes = sorted(prefix for prefix, count in prefix_counts.items() if count == 3)
         forces = select_members(loads, "ExternalForce")
         names = [force.name for force in forces]
         for index, force in enumerate(forces):
@@ -111,11 +114,11 @@ def report_load_columns(setup: Setup, report: FindingCollector) -> None:
                         "loads",
                         force,
                         tag=tag,
-                        # Too many columns match if the identifier is too short, for which another
-                        # spelling is no help.
+                        # If some columns match, the identifier is too short, or a label of the table
+                        # is wrong: another spelling does not help.
                         suggestion=None
-                        if len(matching_columns) > 3
-                        else find_nearest_name(prefix, prefixes),
+                        if matching_columns
+                        else find_nearest_name(prefix, complete_prefixes),
                     )
                 elif [column[-1:].lower() for column in matching_columns] != ["x", "y", "z"] and {
                     column[-1:].lower() for column in matching_columns
