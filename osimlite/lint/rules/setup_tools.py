@@ -67,6 +67,13 @@ FRAMES = {
         "AnalyzeTool", "<coordinates_file>leg.mot</coordinates_file>", "{}"
     ),
     "analyses": _make_analysis_example("", model="muscle.osim"),
+    "actuators": _make_tool_example(
+        "AnalyzeTool",
+        "<coordinates_file>leg.mot</coordinates_file>",
+        "{}",
+        '<AnalysisSet name="analyses"> <objects> <StaticOptimization name="optimization"/> </objects> </AnalysisSet>',
+        model="muscle.osim",
+    ),
     "optimization": _make_analysis_example(
         '<StaticOptimization name="optimization">', "</StaticOptimization>"
     ),
@@ -141,10 +148,10 @@ results belong to another model.
 16 analyses-of-one-name, warning, in analyses: Two analyses have one name. They write to the same files.
 - <Kinematics name="run"/> <Kinematics name="run"/>
 + <Kinematics name="run"/> <Kinematics name="again"/>
-17 unactuated-root, warning, in analyses: No actuator moves the coordinates between the model and ground. Static
+17 unactuated-root, warning, in actuators: No actuator moves the coordinates between the model and ground. Static
 optimization fails without residual actuators.
-- <StaticOptimization name="optimization"/>
-+ <Kinematics name="kinematics"/>
+- <force_set_files></force_set_files>
++ <force_set_files>residuals.xml</force_set_files>
 18 nothing-analyzed, warning, in kinematics: An analysis names no body or coordinate. Nothing is written.
 - <coordinates></coordinates>
 + <coordinates>all</coordinates>
