@@ -105,6 +105,12 @@ MAX_COMPARED_NAMES = 500
 """Largest number of names compared without rapidfuzz: that takes 1 ms, the import of rapidfuzz 6 ms."""
 
 
+SAME_CLASS_SIMILARITY = 80.0
+"""Similarity (%) above which an unknown class is taken for a misspelt one: names of classes have the
+same endings, so that 'ScrewJoint' and 'FreeJoint' reach 74 %.
+"""
+
+
 def find_nearest(word: str, candidates: Iterable[str], *, cutoff: float = 60.0) -> str | None:
     """Return the known name that is most similar to `word`, or None if none is similar.
 
@@ -157,14 +163,15 @@ def measure_similarity(word: str) -> Callable[[str], float]:
     return measure
 
 
-def suggest_name(word: str, candidates: Iterable[str]) -> str:
+def suggest_name(word: str, candidates: Iterable[str], *, cutoff: float = 60.0) -> str:
     """Return ``"; did you mean 'x'?"``, or an empty text if no known name is similar.
 
     Args:
         word: unknown word.
         candidates: valid names.
+        cutoff: smallest similarity (%).
     """
-    result = find_nearest(word, candidates)
+    result = find_nearest(word, candidates, cutoff=cutoff)
     return f"; did you mean '{result}'?" if result else ""
 
 

@@ -8,7 +8,7 @@ from itertools import pairwise
 from math import isfinite
 from typing import TYPE_CHECKING, Any, cast
 
-from osimlite.base.text import add_article, join_words
+from osimlite.base.text import SAME_CLASS_SIMILARITY, add_article, join_words, suggest_name
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.mechanics.multibody import functions as f
 from osimlite.schema import functions as schema
@@ -72,9 +72,12 @@ def convert_function(
                 "MultivariatePolynomialFunction",
             ]
             supported += _UNIVARIATE
+            supported_list = (
+                f"; the supported functions are {join_words(supported, max_count=len(supported))}"
+            )
             raise UnsupportedError(
-                f"{where} is {add_article(name)}, which osimlite cannot differentiate twice; "
-                f"the supported functions are {join_words(supported, max_count=len(supported))}"
+                f"{where} is {add_article(name)}, which osimlite cannot differentiate twice"
+                f"{suggest_name(name, supported, cutoff=SAME_CLASS_SIMILARITY) or supported_list}"
             )
         _require_argument_count(function, 1, arguments)
         return _UNIVARIATE[class_name](function)

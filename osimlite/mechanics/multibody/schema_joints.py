@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from osimlite.base.text import add_article, join_words
+from osimlite.base.text import SAME_CLASS_SIMILARITY, add_article, join_words, suggest_name
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.mechanics.multibody.joints import (
     PLAIN_JOINTS,
@@ -101,9 +101,10 @@ def unknown_joint(path: str, class_name: str) -> UnsupportedError:
         path: path of the joint.
         class_name: name of its class.
     """
+    supported = f"; it supports {join_words(JOINT_TYPES, max_count=len(JOINT_TYPES))}"
     return UnsupportedError(
-        f"'{path}' is {add_article(class_name)}, a class of joints that osimlite does not support; it supports "
-        f"{join_words(JOINT_TYPES, max_count=len(JOINT_TYPES))}"
+        f"'{path}' is {add_article(class_name)}, a class of joints that osimlite does not support"
+        f"{suggest_name(class_name, JOINT_TYPES, cutoff=SAME_CLASS_SIMILARITY) or supported}"
     )
 
 

@@ -363,6 +363,11 @@ def _unknown_joint(model: Model, body: Body, joint: Joint) -> None:
     model.joint_set.objects = objects
 
 
+def _misspelt_joint(model: Model, body: Body, joint: Joint) -> None:
+    objects: list[Any] = [joint, Unknown(name="odd", class_name="PinJiont")]
+    model.joint_set.objects = objects
+
+
 def _unknown_constraint(model: Model, body: Body, joint: Joint) -> None:
     objects: list[Any] = [Unknown(name="odd", class_name="GearConstraint")]
     model.constraint_set.objects = objects
@@ -432,6 +437,7 @@ def _no_inertia(model: Model, body: Body, joint: Joint) -> None:
             "of '/jointset/hinge/hinge_0' is an ExpressionBasedFunction",
         ),
         (_unknown_joint, UnsupportedError, "'/jointset/odd' is a ScrewJoint.*PinJoint"),
+        (_misspelt_joint, UnsupportedError, "did you mean 'PinJoint'"),
         (
             _unknown_constraint,
             UnsupportedError,
