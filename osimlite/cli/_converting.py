@@ -499,13 +499,17 @@ def print_formats() -> None:
     exporters = {exporter.name: exporter for exporter in EXPORTERS}
     importers = list_importers()
     for name, importer in importers.items():
-        direction = "in, out" if name in exporters else f"in, to {importer.target}"
+        direction = "in, out" if name in exporters else "in"
+        # Its result is not a single file.
+        result_note = (
+            "; writes a folder with models, trials and setups" if importer.target == PROJECT else ""
+        )
         add_row(
             table,
             name,
             " ".join(importer.suffixes),
             direction,
-            f"{importer.title}: {importer.carries}",
+            f"{importer.title}: {importer.carries}{result_note}",
         )
     for name, exporter in exporters.items():
         if name not in importers:

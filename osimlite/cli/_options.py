@@ -69,7 +69,12 @@ LastFrame = Annotated[
 ]
 Mass = Annotated[
     float,
-    Option("--mass", metavar="KG", help="Mass of the subject.", show_default="mass of the model"),
+    Option(
+        "--mass",
+        metavar="KG",
+        help="Mass of the subject.",
+        show_default="each mass is scaled with the volume of its body",
+    ),
 ]
 Weights = Annotated[
     list[str] | None,
@@ -296,7 +301,7 @@ def choose_output_folder(file: Path, output: Path | None) -> Path:
 
 
 def check_mass(mass: float) -> None:
-    """Check the mass of a subject in kg; -1, the default, keeps the mass of the model.
+    """Check the mass of a subject in kg; -1, the default, scales masses with the volumes.
 
     Args:
         mass: mass of the subject, kg.
@@ -415,7 +420,7 @@ def parse_quantities(
             if name in states:
                 result[name] = float(text)
                 continue
-            result[name] = convert_value(mechanism, name, text)
+            result[name] = convert_value(mechanism, name, text, is_speed=option == "--set-speed")
             # Only values are compared with the coordinate's range; speeds have none.
             coordinate = mechanism.coordinates[mechanism.coordinate_index(name)]
             if option == "--set" and (suspicion := describe_suspect_value(coordinate, name, text)):

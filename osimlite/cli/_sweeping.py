@@ -18,7 +18,8 @@ Vary = Annotated[
         "--vary",
         metavar="NAME=RANGE",
         help="NAME: a coordinate, COORDINATE/speed, MUSCLE/control, COMPONENT/PROPERTY, or a parameter of the model "
-        "function or controller (default: all of these parameters). RANGE: LOW:HIGH, LOW:HIGH:log, or LOW:HIGH:COUNT in a sweep. "
+        "function or controller. If nothing has a range here, all parameters of the controller vary. "
+        "RANGE: LOW:HIGH, LOW:HIGH:log, or LOW:HIGH:COUNT in a sweep. "
         "Wildcards, factors, and controls that change over time: docs/sweeps.md.",
         show_default=False,
     ),
@@ -27,7 +28,7 @@ ReportInterval = Annotated[
     float | None,
     Option(
         metavar="SECONDS",
-        help="Time between the states that functions and expressions of measures use.",
+        help="Time step of the motion from which measures (expressions, module:function) are computed.",
         show_default="0.01 for expressions",
     ),
 ]

@@ -70,10 +70,11 @@ def describe_table_differences(old_file: Path, new_file: Path) -> list[str]:
                     )
                 )
             )
-            rows = f"{np.count_nonzero(is_changed)} of {len(times)} rows differ"
+            count = np.count_nonzero(is_changed)
+            extent = f"differs at {count} of the {len(times)} times that both tables have"
             change = f"{format_shortest(float(old_values[largest_row]))} -> {format_shortest(float(new_values[largest_row]))}"
             lines.append(
-                f"  {column}: {change} at {times[largest_row]:g} s, where it differs most; {rows}"
+                f"  {column}: {change} at {times[largest_row]:g} s, where the difference is largest; {extent}"
             )
     return lines
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
+from osimlite.base.text import add_article
 from osimlite.cli._command import Argument, Option, command
 
 
@@ -91,7 +92,9 @@ def modify(
             (member for member in top.walk() if isinstance(member, ModelProcessor)), None
         )
         if processor is None:
-            raise DocumentError(f"a {type(top).__name__} has no model to change", file=str(file))
+            raise DocumentError(
+                f"{add_article(type(top).__name__)} has no model to change", file=str(file)
+            )
         model = process_model(processor, file.parent)
     rewritten = []
     if source == "nimble":
@@ -113,14 +116,14 @@ def modify(
     if source == "nimble" and not rewritten:
         say("OpenSim moves this model as Nimble does; nothing was rewritten")
     if fitted:
-        table = create_table()
+        table = create_table("Errors of the fitted polynomials")
         for heading in (
             "path",
             "coordinates",
             "order",
-            "length, mm",
-            "moment arm, mm",
-            "worst, mm",
+            "length: rms, mm",
+            "moment arms: rms, mm",
+            "largest of all, mm",
         ):
             table.add_column(heading, justify="left" if heading == "path" else "right")
         for path_fit in sorted(fitted, key=lambda path_fit: -path_fit.worst_arm):

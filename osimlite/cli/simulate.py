@@ -68,6 +68,7 @@ def simulate(
     from osimlite.base.require import require
     from osimlite.errors import SettingError, SimulationError
     from osimlite.io.document.reader import read
+    from osimlite.simulation.options import INTEGRATION_OPTIONS
 
     # Missing packages are reported before the simulation.
     if plot:
@@ -79,6 +80,15 @@ def simulate(
     # The earlier simulation is read at the start and would be replaced at the end.
     if earlier is not None and results.resolve() == Path(earlier).resolve():
         raise SettingError(f"'{results}' has the earlier simulation; name another folder with -o")
+    has_fixed_step = option_values["fixed_step"] is not None
+    if gui or has_fixed_step:
+        step_option = "--fixed-step" if has_fixed_step else "--gui"
+        for name in INTEGRATION_OPTIONS:
+            if option_values.get(name) is not None:
+                raise SettingError(
+                    f"--{name} cannot be combined with {step_option}, because fixed steps have no error control; "
+                    "leave one of them out"
+                )
     model = read(file)
     feedback = options.read_feedback(controller, par)
     if controls:

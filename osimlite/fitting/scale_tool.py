@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from osimlite.base.records import dataclass, field
-from osimlite.base.text import suggest_name
+from osimlite.base.text import add_article, suggest_name
 from osimlite.errors import DocumentError, SettingError
 from osimlite.fitting.fit_messages import describe_unknown
 from osimlite.fitting.ik_tool import NO_FILE, read_coordinate_table
@@ -304,7 +304,7 @@ def add_markers(model: Model, path: Path) -> None:
     result = read_copy(path, Object)
     if not isinstance(result, MarkerSet):
         raise DocumentError(
-            f"the file holds a {type(result).__name__}, not a MarkerSet", file=str(path)
+            f"the file holds {add_article(type(result).__name__)}, not a MarkerSet", file=str(path)
         )
     for marker in result.objects:
         # A copy of the list, because markers are removed from it.

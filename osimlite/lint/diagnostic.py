@@ -37,7 +37,7 @@ class Consequence(StrEnum):
     REFUSES: it rejects the file or the model, crashes, or hangs, before it computes a motion.
     FAILS: it loads the model, and fails as soon as it needs the faulty part.
     NAN: it runs the model, and computes NaN.
-    RUNS: it runs the model, but may compute something else than the file describes.
+    RUNS: it runs the model, but may compute something different from what is written.
     """
 
     REFUSES = "refuses"

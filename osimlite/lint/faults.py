@@ -40,9 +40,10 @@ class RuleFault(NamedTuple):
     def page(self, group: str) -> str:
         """Return the page of the fault; `group` is the code and the name of its rule."""
         reason = self.text.partition(". ")[2] or self.text
+        fact = self.summary[0].lower() + self.summary[1:]
         return (
-            f"{self.summary}\n\n## What it does\nReports every place where this happens. The rule is "
-            f"one of the group `{group}`.\n\n## Why is this bad\n{reason}\n\n## "
+            f"{self.summary}\n\n## What it does\nReports every place where {fact} The rule belongs to "
+            f"the group `{group}`.\n\n## Why is this bad\n{reason}\n\n## "
             f"Example\n{self._format_example('+')}\n\n## Use instead\n{self._format_example('-')}"
         )
 

@@ -23,10 +23,10 @@ _FIX_TEXTS = {
     "both": "sometimes: with --fix, or with --unsafe-fixes if the fix is a guess",
 }
 _CONSEQUENCE_TEXTS = {
-    REFUSES: "refuses the file",
+    REFUSES: "rejects the file",
     FAILS: "fails when it needs the faulty part",
     NAN: "computes NaN",
-    RUNS: "runs it, but may compute something else than the file describes",
+    RUNS: "accepts the file but may compute something different from what is written",
 }
 _INTRODUCTION = """\
 # Rules
@@ -40,9 +40,9 @@ severity than its rule if the file shows a reason for it. `--fix` makes **safe**
 or the one that was certainly meant. An **unsafe** fix is a guess; `--unsafe-fixes` makes it.
 
 The column **OpenSim** is about errors: OpenSim **refuses** the file or the model (or crashes or hangs), loads it and
-**fails** as soon as it needs the faulty part, computes **nan**, or **runs** it, but may compute something else than
-the file describes. The column is empty if the rule does not say. In `--format json`, each finding has one of these
-words as `consequence`: for a warning or an info it is `runs`."""
+**fails** as soon as it needs the faulty part, computes **nan**, or **runs** it, but may compute something
+different from what the file describes. The column is empty if the rule does not say. In `--format json`, each finding
+has one of these words as `consequence`: for a warning or an info it is `runs`."""
 _SHORT = {"": "", "safe": "safe", "unsafe": "unsafe", "both": "safe or unsafe"}
 
 
@@ -95,7 +95,10 @@ def _label_consequences(rule: Rule) -> str:
 
 def describe_consequences(rule: Rule) -> str:
     """Return the consequences of the errors of a rule, such as ``computes NaN``; "" if unknown."""
-    return ", or ".join(map(_CONSEQUENCE_TEXTS.__getitem__, rule.consequences))
+    if not rule.consequences:
+        return ""
+    first, *others = map(_CONSEQUENCE_TEXTS.__getitem__, rule.consequences)
+    return f"{first} in some cases; in others it {', or '.join(others)}" if others else first
 
 
 def format_index() -> str:

@@ -16,7 +16,7 @@ from osimlite.base.load import (
     locate_errors,
     run_python_file,
 )
-from osimlite.base.text import join_words, suggest_name
+from osimlite.base.text import add_article, join_words, suggest_name
 from osimlite.errors import MissingDependency, OsimliteError
 from osimlite.io.document.data import SUFFIXES, read_data
 from osimlite.models import BUILT_IN, STUDIES
@@ -57,7 +57,9 @@ def make_model(source: str, parameters: Mapping[str, str] | None = None) -> Mode
     ):
         model = function(**arguments)
     if not isinstance(model, Model):
-        raise OsimliteError(f"'{source}' returned a {type(model).__name__}, not an osimlite.Model")
+        raise OsimliteError(
+            f"'{source}' returned {add_article(type(model).__name__)}, not an osimlite.Model"
+        )
     return model
 
 

@@ -9,6 +9,7 @@ from functools import cache
 from importlib import import_module
 
 from osimlite.base.syntax_trees import parse_module
+from osimlite.base.text import add_article
 from osimlite.schema.base import Object
 from osimlite.schema.fields import ObjectField, Reference, Value
 from osimlite.schema.specs import FieldSpec, get_field_specs
@@ -37,7 +38,11 @@ def describe_value(spec: FieldSpec) -> str:
         return text + (f", {kind.domain}" if kind.domain else "")
     if isinstance(kind, Reference):
         is_list = kind.shape == "list"
-        return f"names of {kind.target} components" if is_list else f"the name of a {kind.target}"
+        return (
+            f"names of {kind.target} components"
+            if is_list
+            else f"the name of {add_article(kind.target)}"
+        )
     assert isinstance(kind, ObjectField) and spec.accepts is not None
     tag = spec.accepts.tag or "Object"
     return f"objects of class {tag}" if kind.form == "list" else f"one {tag}"

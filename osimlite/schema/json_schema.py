@@ -14,6 +14,7 @@ import sys
 from importlib import import_module
 from typing import Any
 
+from osimlite.base.text import add_article
 from osimlite.schema.base import Object, Unknown
 from osimlite.schema.descriptions import describe_property
 from osimlite.schema.fields import ObjectField, Reference, Value
@@ -180,7 +181,7 @@ def _describe_field(spec: FieldSpec) -> str:
     """Return the text that an editor shows: the meaning of a property and what its type leaves open."""
     words = ""
     if isinstance(spec.kind, Reference):
-        words = f"names a {spec.kind.target}, {spec.kind.rule}"
+        words = f"names {add_article(spec.kind.target)}, {spec.kind.rule}"
     elif isinstance(spec.kind, Value):
         words = ", ".join(word for word in (spec.kind.unit, spec.kind.domain) if word)
     return " ".join(part for part in (describe_property(spec), words and f"({words})") if part)

@@ -7,6 +7,7 @@ from pathlib import PurePath
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar, cast, overload
 
 from osimlite.base.lazy import make_notebook_repr
+from osimlite.base.text import add_article
 from osimlite.errors import ModelError, OsimliteError
 from osimlite.schema.base import Component, ModelComponent, make_default
 from osimlite.schema.contact import ContactGeometrySet
@@ -186,7 +187,7 @@ class Model(ModelComponent):
             else:
                 if not isinstance(component, ModelComponent):
                     raise ModelError(
-                        f"no set of a model accepts a {type(component).__name__}; add it to its owner, such as "
+                        f"no set of a model accepts {add_article(type(component).__name__)}; add it to its owner, such as "
                         "a frame or a force"
                     )
                 _append_member(self.component_set.objects, component)
@@ -214,7 +215,7 @@ def check_is_model(value: object) -> None:
             f"expected a Model, found a path; read the file first: osimlite.read('{value}')"
         )
     raise OsimliteError(
-        f"expected a Model, found a {type(value).__name__}; osimlite.read(path) returns a Model"
+        f"expected a Model, found {add_article(type(value).__name__)}; osimlite.read(path) returns a Model"
     )
 
 
@@ -226,7 +227,7 @@ def _append_member(members: list[Any], component: Component) -> None:
             )
         if component.name and member.name == component.name:
             raise ModelError(
-                f"there is a {type(member).__name__} '{component.name}' in the model already; "
+                f"there is {add_article(type(member).__name__)} '{component.name}' in the model already; "
                 f"give this {type(component).__name__} another name"
             )
     members.append(component)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import cast
 
+from osimlite.base.text import add_article
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.schema.forces import Actuator, ScalarActuator
 from osimlite.schema.model import Model
@@ -66,7 +67,7 @@ def replace_by_ideal_actuators(model: Model, physiology: bool) -> list[ScalarAct
             continue
         if not isinstance(item, ScalarActuator):
             raise UnsupportedError(
-                f"'{item.name}' is a {type(item).__name__}, which does not have exactly one control"
+                f"'{item.name}' is {add_article(type(item).__name__)}, which does not have exactly one control"
             )
         if not (isinstance(item, Muscle) and physiology):
             force = (

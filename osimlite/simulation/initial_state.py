@@ -19,13 +19,16 @@ if TYPE_CHECKING:
     from osimlite.simulation.trajectory import Trajectory
 
 
-def convert_value(mechanism: Mechanism, name: str, value: float | str) -> float:
+def convert_value(
+    mechanism: Mechanism, name: str, value: float | str, *, is_speed: bool = False
+) -> float:
     """Convert a value or speed of a coordinate to SI units.
 
     Args:
         mechanism: the mechanism.
         name: name or path of the coordinate.
         value: a number in rad or m, or a text such as ``"30deg"`` with or without a unit.
+        is_speed: whether the value is a speed, for messages.
 
     Returns:
         The number in rad or m (per second for a speed).
@@ -48,10 +51,11 @@ def convert_value(mechanism: Mechanism, name: str, value: float | str) -> float:
         and motion_type != "coupled"
         and quantity.is_angle != (motion_type == "rotational")
     ):
-        expected_units = "deg or rad" if motion_type == "rotational" else "m, cm or mm"
-        raise SettingError(
-            f"coordinate '{name}' is {motion_type}: give '{value}' in {expected_units}"
-        )
+        units = ("deg", "rad") if motion_type == "rotational" else ("m", "cm", "mm")
+        *first_units, last_unit = (f"{unit}/s" if is_speed else unit for unit in units)
+        expected_units = f"{', '.join(first_units)} or {last_unit}"
+        subject = f"the speed of coordinate '{name}'" if is_speed else f"coordinate '{name}'"
+        raise SettingError(f"{subject} is {motion_type}: give '{value}' in {expected_units}")
     return quantity.value
 
 

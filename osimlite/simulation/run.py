@@ -218,10 +218,10 @@ class Simulation:
             {
                 name: float(value)
                 if name in self.paths
-                else convert_value(self.mechanism, name, value)
+                else convert_value(self.mechanism, name, value, is_speed=is_speed)
                 for name, value in (numbers or {}).items()
             }
-            for numbers in (initial, options.initial_speeds)
+            for numbers, is_speed in ((initial, False), (options.initial_speeds, True))
         )
         controls = self.forces.controls
         extra_settings = {}

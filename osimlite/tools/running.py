@@ -116,7 +116,9 @@ def run(
         OsimliteError: the tool failed; then it has written nothing.
     """
     if not isinstance(setup, str | os.PathLike):
-        raise OsimliteError(f"expected the path of a setup file, found a {type(setup).__name__}")
+        raise OsimliteError(
+            f"expected the path of a setup file, found {add_article(type(setup).__name__)}"
+        )
     file = Path(setup)
     setup_object = read_any(file)
     class_name = type(setup_object).__name__

@@ -164,8 +164,8 @@ MJCF_CHOICES = (
     OptionSpec(
         "spline",
         str | None,
-        "How to fit a spline that moves a joint: 'quartic', one polynomial of degree four, or 'series', two of them: the second "
-        "takes the value of the first.",
+        "How to fit a spline that moves a joint: 'quartic', one polynomial of degree four, or 'series', two polynomials of "
+        "degree four in a row: the result of the first is the input of the second.",
         default_text="series",
         group="MJCF",
     ),

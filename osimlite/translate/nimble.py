@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from osimlite.base.records import dataclass
-from osimlite.base.text import join_words
+from osimlite.base.text import add_article, join_words
 from osimlite.errors import UnsupportedError
 from osimlite.io.nimble import (
     JOINT_CLASSES,
@@ -99,7 +99,7 @@ def convert_from_nimble(model: Model) -> list[NimbleChange]:
             continue
         if not isinstance(joint, JOINT_CLASSES):
             raise UnsupportedError(
-                f"'{joint.path}': Nimble cannot read a {type(joint).__name__}, so this model was not made for Nimble"
+                f"'{joint.path}': Nimble cannot read {add_article(type(joint).__name__)}, so this model was not made for Nimble"
             )
         if isinstance(joint, EllipsoidJoint):
             if has_rotated_frames(joint):

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from osimlite.base.files import MESH_FOLDER_HINT
+from osimlite.base.text import add_article
 from osimlite.errors import ModelError, OsimliteError, UnsupportedError
 from osimlite.io.meshes import unit_shapes
 from osimlite.io.meshes.folders import MeshFolders, read_surface
@@ -310,14 +311,16 @@ class _SceneCollector:
                 ), np.eye(4)
             case contact_types.ContactHalfSpace():
                 return unit_shapes.make_square(), np.eye(4)
-        raise UnsupportedError(f"is a {type(shape).__name__}, which osimlite does not draw")
+        raise UnsupportedError(
+            f"is {add_article(type(shape).__name__)}, which osimlite does not draw"
+        )
 
     def _add_path(self, path: AbstractGeometryPath, name: str) -> None:
         owner = self.tree.parent_of(path)
         traced_path = PATH.read(self.builder, owner)
         if not isinstance(traced_path, TraceablePath):
             raise UnsupportedError(
-                f"is a {type(path).__name__}, which has a length but no points in space; "
+                f"is {add_article(type(path).__name__)}, which has a length but no points in space; "
                 "OpenSim does not draw it either"
             )
         owner_path = (self.tree.path_of(owner) if owner is not None else None) or name

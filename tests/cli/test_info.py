@@ -105,7 +105,8 @@ def test_diff_of_tables(fixtures, tmp_path):
         "- pelvis_tilt", "+ tilt", "  inDegrees: yes -> no", "  rows: 61 -> 60",
     ]  # fmt: skip
     assert done.out.splitlines()[5:] == [
-        "  pelvis_tx: 0.62331989 -> 1.5 at 0.1 s, where it differs most; 1 of 60 rows differ"
+        "  pelvis_tx: 0.62331989 -> 1.5 at 0.1 s, where the difference is largest; "
+        "differs at 1 of the 60 times that both tables have"
     ]
     assert (run("diff", old, old).code, run("diff", old, old).out) == (0, "")
     told = run("diff", new, fixtures / "walker" / "DynamicWalkerModel.osim")

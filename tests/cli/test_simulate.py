@@ -143,7 +143,12 @@ def test_fixed_step(walker, tmp_path):
         (["--set", "RHip_rz=3cm"], 2, "deg or rad"),
         (["--set", "platform_rz=0"], 1, "is locked"),
         (["--to", "-1"], 2, "positive time"),
-        (["--fixed-step", "0.1", "--accuracy", "1e-3"], 2, "leave one of them out"),
+        (["--set-speed", "Pelvis_tx=3deg"], 2, "m/s, cm/s or mm/s"),
+        (
+            ["--fixed-step", "0.1", "--accuracy", "1e-3"],
+            2,
+            "--accuracy cannot be combined with --fixed-step",
+        ),
         (["--set", "RHip_rz=0.1", "--set", "RHip_rz=0.2"], 2, "--set names 'RHip_rz' twice"),
         (["--engine", "bulet"], 2, "did you mean 'bullet'"),
         (["--gui"], 1, "no screen"),

@@ -186,12 +186,14 @@ def test_a_page_says_severity_mends_and_settings():
     pages = {rule.code: format_rule_page(rule) for rule in all_rules()}
     assert pages["OSIM312"].startswith(
         "# illegal-name (OSIM312)\n\nSeverity: error; warning in files of a version before 30500\nFix: none\n"
-        "OpenSim: refuses the file\n"
+        "OpenSim: rejects the file\n"
     )
     assert "Fix: sometimes, with --fix\n" in pages["OSIM104"]
-    assert "\nOpenSim: refuses the file, or computes NaN\n" in pages["OSIM407"]
+    assert (
+        "\nOpenSim: rejects the file in some cases; in others it computes NaN\n" in pages["OSIM407"]
+    )
     assert "\nOpenSim: " not in pages["OSIM311"]
-    assert "\nOpenSim, if the finding is an error: refuses the file\n" in pages["OSIM701"]
+    assert "\nOpenSim, if the finding is an error: rejects the file\n" in pages["OSIM701"]
     assert (
         "- `contact-depth = 0.001` (m): largest accepted depth of a sphere inside a surface at the start"
         in pages["OSIM521"]

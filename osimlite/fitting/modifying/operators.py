@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
-from osimlite.base.text import suggest_name
+from osimlite.base.text import add_article, suggest_name
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.io.document.cache import read_copy
 from osimlite.io.document.reader import read_document
@@ -154,7 +154,7 @@ def _replace_with_degroote(model: Model, operator: Any, folder: Path) -> None:
             }
         else:
             raise UnsupportedError(
-                f"'{muscle.name}' is a {type(muscle).__name__}, which no DeGrooteFregly2016Muscle "
+                f"'{muscle.name}' is {add_article(type(muscle).__name__)}, which no DeGrooteFregly2016Muscle "
                 "replaces with the same "
                 "behavior; Thelen2003Muscle and Millard2012EquilibriumMuscle can be replaced"
             )

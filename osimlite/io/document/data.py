@@ -18,7 +18,7 @@ from typing import Any
 
 from osimlite.base.files import read_file, write_atomically
 from osimlite.base.require import require
-from osimlite.base.text import shorten_message, suggest_name
+from osimlite.base.text import add_article, shorten_message, suggest_name
 from osimlite.errors import DocumentError, MissingFileError, ModelError
 from osimlite.io.document.lexical import UncleanText, parse_real
 from osimlite.io.document.objects import get_layout
@@ -222,7 +222,7 @@ class _Reader:
             data = {"objects": data}
         if not isinstance(data, Mapping):
             raise ModelError(
-                f"{location}: expected a mapping that describes a {accepts.tag}, not {_describe_type(data)}"
+                f"{location}: expected a mapping that describes {add_article(accepts.tag)}, not {_describe_type(data)}"
             )
         cls = self._find_class(data, accepts, location)
         specs = get_field_specs(cls)
@@ -242,7 +242,7 @@ class _Reader:
             spec = by_name.get(key) or specs.get(key)
             if spec is None:
                 raise ModelError(
-                    f"{location}: a {cls.tag} has no property '{key}'{suggest_name(str(key), by_name)}"
+                    f"{location}: {add_article(cls.tag)} has no property '{key}'{suggest_name(str(key), by_name)}"
                 )
             # A property may be given by its Python name and by its tag.
             if spec.name in values:
@@ -278,7 +278,9 @@ class _Reader:
                 f"{location}.class: there is no class '{tag}'{suggest_name(str(tag), list_tags())}"
             )
         if not issubclass(cls, accepts):
-            raise ModelError(f"{location}.class: a {tag} cannot stand here, only a {accepts.tag}")
+            raise ModelError(
+                f"{location}.class: {add_article(tag)} cannot stand here, only {add_article(accepts.tag)}"
+            )
         return cls
 
     def _convert_value(self, data: Any, spec: FieldSpec, location: str) -> Any:
@@ -360,7 +362,8 @@ def _describe_type(data: Any) -> str:
         type(None): "nothing",
     }
     return names.get(
-        type(data), "a number" if isinstance(data, (int, float)) else f"a {type(data).__name__}"
+        type(data),
+        "a number" if isinstance(data, (int, float)) else add_article(type(data).__name__),
     )
 
 

@@ -108,8 +108,9 @@ def report_out_of_reach(subject: Subject, report: FindingCollector) -> None:
 
     Reports muscles whose path in the default pose is shorter than `tendon_slack_length`, or exceeds
     it by more than 2 optimal fiber lengths. Paths around surfaces count as straight, which is their
-    minimum length. Paths through moving points, or through points whose position needs a
-    simulation, are not checked.
+    minimum length. Paths with a moving point are not checked. Neither are paths with a point on
+    a body beyond a prescribed coordinate, or beyond a joint with a function that the linter does
+    not evaluate, such as a GCVSpline.
 
     If a path is too short, the tendon is slack and the muscle has no force. If a path is too long,
     real fibers would tear. OpenSim finds no equilibrium of such a muscle, computes NaN, or computes

@@ -244,7 +244,12 @@ def report_table_count(table: Table, report: FindingCollector) -> None:
         if severity is ERROR and row_kind == "rows" and number == number:
             lost_count = count - number
             severity, consequence = (
-                (ERROR, f": OpenSim ignores the last {format_count(round(lost_count), 'row')}")
+                (
+                    ERROR,
+                    ": OpenSim ignores the last row"
+                    if round(lost_count) == 1
+                    else f": OpenSim ignores the last {format_count(round(lost_count), 'row')}",
+                )
                 if lost_count > 0
                 else (WARNING, "")
             )

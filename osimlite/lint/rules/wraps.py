@@ -80,9 +80,9 @@ def report_wrap_range(subject: Subject, report: FindingCollector) -> None:
 
     The path never wraps around the surface. If the range ends before it begins, OpenSim also
     ignores all later wraps of the path. If the range ends beyond the last point, OpenSim fails when
-    it computes the path length, and its message names no wrap. (It does not fail in poses in which
-    no conditional point of an earlier wrap is active.) Points count from 1, and -1 stands for
-    either end.
+    it computes the path length, and its message names no wrap. If the range of an earlier wrap has
+    only conditional points, OpenSim fails only in poses in which one of these points is active.
+    Points count from 1, and -1 stands for either end.
 
     ```xml
     - <PathWrap name="around"> <wrap_object>condyle</wrap_object> <range>2 1</range> </PathWrap>
@@ -107,7 +107,11 @@ def report_wrap_range(subject: Subject, report: FindingCollector) -> None:
             end = last if last > 0 else count
             if end > count and start <= end and not (has_inverted_range or is_off):
                 consequence = "OpenSim fails when it computes the length of the path"
-                consequence += ", unless an earlier wrap has no points there" if may_leave else ""
+                consequence += (
+                    ", unless all points in the range of an earlier wrap are inactive conditional points"
+                    if may_leave
+                    else ""
+                )
                 report(
                     f"{range_text} ends beyond the {format_count(count, 'point')} of the path: {consequence}",
                     wrap,

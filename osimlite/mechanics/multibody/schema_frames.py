@@ -117,7 +117,7 @@ class Placements:
         if not isinstance(target, PhysicalFrame):
             class_name = getattr(target, "class_name", "") or type(target).__name__
             raise UnsupportedError(
-                f"'{self.path(owner)}': {socket} names '{self.path(target)}', a {class_name}, "
+                f"'{self.path(owner)}': {socket} names '{self.path(target)}', {add_article(class_name)}, "
                 "a class of frames that osimlite does not support here; name a body or a PhysicalOffsetFrame"
             )
         return target
@@ -148,8 +148,8 @@ class Placements:
             target = self.tree.target(frame, socket, getattr(frame, socket))
             if not isinstance(target, Station):
                 raise ModelError(
-                    f"the frame '{self.path(frame)}': {socket} names '{self.path(target)}', a {type(target).__name__}; "
-                    "name a Station"
+                    f"the frame '{self.path(frame)}': {socket} names '{self.path(target)}', {add_article(type(target).__name__)}"
+                    "; name a Station"
                 )
             stations.append(target)
         return stations

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.base.text import suggest_or_list
+from osimlite.base.text import add_article, suggest_or_list
 from osimlite.mechanics.kernels.criteria import (
     CRITERION,
     CRITERION_TYPE,
@@ -152,7 +152,7 @@ class Measure(ABC):
         self.report: dict[str, Array] = {}
         self.terms: dict[str, Array] = {}
         self.read(node)
-        node.refuse_unread_parts(f"a {type(self).__name__}", tuple(MEASURES))
+        node.refuse_unread_parts(add_article(type(self).__name__), tuple(MEASURES))
 
     def default_name(self) -> str:
         """Return the name of a measure without a `name`."""

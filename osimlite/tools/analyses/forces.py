@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from osimlite.base.text import format_count, join_words, suggest_name
+from osimlite.base.text import add_article, format_count, join_words, suggest_name
 from osimlite.io.tables.old_storage import UNITS
 from osimlite.io.tables.storage import read_sto
 from osimlite.mechanics.multibody.schema_frames import Placements
@@ -241,7 +241,8 @@ def write_actuation(analysis: Actuation, motion: Motion, tables: AnalysisTables)
         # The table has one column per actuator.
         if actuator.control_count != 1:
             raise tables.job.create_unsupported_error(
-                f"'{analysis.name}' needs actuators with one force each, but '{actuator.name}', a {type(actuator).__name__}, "
+                f"'{analysis.name}' needs actuators with one force each, but "
+                f"'{actuator.name}', {add_article(type(actuator).__name__)}, "
                 "has several; OpenSim crashes on such a model"
             )
     tree = motion.model.tree()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from osimlite.base.text import add_article
 from osimlite.io.tables.old_storage import UNITS
 from osimlite.io.tables.writers import format_control_set
 from osimlite.mechanics.multibody.spatial import Array
@@ -50,7 +51,7 @@ def write_muscle_analysis(analysis: MuscleAnalysis, motion: Motion, tables: Anal
         reason = reason or ("" if muscle.appliesForce else "whose appliesForce is false")
         if reason:
             raise tables.job.create_unsupported_error(
-                f"'{analysis.name}' requests '{muscle.name}', a {type(muscle).__name__}, {reason}"
+                f"'{analysis.name}' requests '{muscle.name}', {add_article(type(muscle).__name__)}, {reason}"
             )
     names = [muscle.name for muscle in muscles]
     result = _compute_tables(motion, muscles)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from osimlite.base.patterns import compile_later
-from osimlite.base.text import join_words, suggest_name
+from osimlite.base.text import add_article, join_words, suggest_name
 from osimlite.io.tables.old_storage import DEGREES, UNITS
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.base import Component
@@ -72,7 +72,7 @@ def write_outputs(analysis: OutputReporter, motion: Motion, tables: AnalysisTabl
         # Channels belong to list outputs, which have no reader.
         if reader is None or match["channel"]:
             raise tables.job.create_unsupported_error(
-                f"'{analysis.name}' requests '{requested}' of a {type(component).__name__}, which "
+                f"'{analysis.name}' requests '{requested}' of {add_article(type(component).__name__)}, which "
                 "osimlite cannot compute yet"
             )
         columns[value_type].append(match["alias"] or f"{path}|{match['output']}")
@@ -154,7 +154,7 @@ def write_probes(analysis: ProbeReporter, motion: Motion, tables: AnalysisTables
         # A table without a requested probe could be mistaken for a complete one.
         if probe.enabled and tree.path_of(probe) not in computed_paths:
             raise tables.job.create_unsupported_error(
-                f"'{analysis.name}' requests '{probe.name}', a {type(probe).__name__} that "
+                f"'{analysis.name}' requests '{probe.name}', {add_article(type(probe).__name__)} that "
                 "osimlite cannot compute"
             )
     rows = motion.compute_balanced(_compute_probe_rows)

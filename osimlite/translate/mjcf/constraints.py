@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from osimlite.base.text import add_article
 from osimlite.mechanics.multibody import body_constraints as b
 from osimlite.translate.fidelity import LEFT_OUT
 from osimlite.translate.mjcf.draft import SPECK_MASS_KG, MjcfDraft, add_element
@@ -23,7 +24,7 @@ def add_constraints(draft: MjcfDraft) -> None:
         if constraint.bodies:
             add_constraint = _MAKERS.get(type(constraint))
             if add_constraint is None:
-                description = f"a {type(constraint).__name__}"
+                description = add_article(type(constraint).__name__)
                 draft.fidelity.add(
                     "constraint",
                     constraint.name,

@@ -7,6 +7,7 @@ from itertools import combinations
 
 import numpy as np
 
+from osimlite.base.text import add_article
 from osimlite.errors import ModelError
 from osimlite.mechanics.multibody.spatial import Array, make_offset
 from osimlite.schema.contact import ContactGeometry
@@ -55,12 +56,12 @@ def add_contacts(draft: MjcfDraft) -> None:
         try:
             _add_surface(draft, geometry, path)
         except (ModelError, Untranslatable) as error:
-            description = f"a {type(geometry).__name__}"
+            description = add_article(type(geometry).__name__)
             draft.fidelity.add("contact-geometry", path, description, f"{LEFT_OUT}: {error}")
     for force, path in draft.iterate_components(Force):
         if not isinstance(force, ContactForce) or not force.appliesForce:
             continue
-        description = f"the contact law of a {type(force).__name__}"
+        description = f"the contact law of {add_article(type(force).__name__)}"
         try:
             pair_names = " ".join(_add_pairs(draft, force))
         except ModelError as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from osimlite.base.text import add_article
 from osimlite.schema.base import ModelComponent
 from osimlite.schema.contact import ContactGeometry
 from osimlite.schema.sets import Controller
@@ -27,7 +28,7 @@ def add_driven(draft: MjcfDraft) -> None:
         draft.fidelity.add(
             "force",
             path.strip("'"),
-            f"a {force_class.rstrip(')')}",
+            add_article(force_class.rstrip(")")),
             f"{LEFT_OUT}: osimlite cannot compute it",
         )
     for element in forces.elements:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from osimlite.base.text import add_article
 from osimlite.errors import ModelError
 from osimlite.schema.forces import Force
 from osimlite.schema.muscles import Muscle
@@ -51,4 +52,4 @@ def add_forces(draft: MjcfDraft) -> None:
             elif class_name in MAKERS:
                 draft.fidelity.translated[path] = MAKERS[class_name](draft, force, path)
         except (ModelError, Untranslatable) as error:
-            draft.fidelity.add("force", path, f"a {class_name}", f"{LEFT_OUT}: {error}")
+            draft.fidelity.add("force", path, add_article(class_name), f"{LEFT_OUT}: {error}")

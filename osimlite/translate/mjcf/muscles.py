@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.require import require
+from osimlite.base.text import add_article
 from osimlite.errors import OsimliteError
 from osimlite.mechanics.laws.deprecated_muscles import schutte_velocity
 from osimlite.mechanics.multibody.schema_functions import convert_function
@@ -236,7 +237,7 @@ def add_muscle(draft: MjcfDraft, force: Muscle, path: str) -> str:
     draft.fidelity.add(
         "muscle",
         path,
-        f"a {type(force).__name__}: an elastic tendon, fibers at a changing angle, non-parabolic curves",
+        f"{add_article(type(force).__name__)}: an elastic tendon, fibers at a changing angle, non-parabolic curves",
         "a MuJoCo muscle, "
         + (
             "fitted to the isometric force"

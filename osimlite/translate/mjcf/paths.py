@@ -10,6 +10,7 @@ from numpy.polynomial import Polynomial
 
 from osimlite.base.progress import report_stage, watch_items
 from osimlite.base.records import dataclass, field
+from osimlite.base.text import add_article, join_words
 from osimlite.mechanics.kernels.paths import NODE_TYPE
 from osimlite.mechanics.multibody.mechanism import GROUND
 from osimlite.mechanics.multibody.spatial import Array
@@ -79,7 +80,9 @@ def add_paths(draft: MjcfDraft) -> None:
         # Function-based paths have no points for sites.
         if not isinstance(route, ThroughPoints):
             class_name = type(geometry).__name__
-            draft.fidelity.add("path", geometry_path, f"a path that is a {class_name}", LEFT_OUT)
+            draft.fidelity.add(
+                "path", geometry_path, f"a path that is {add_article(class_name)}", LEFT_OUT
+            )
             continue
         router = Router(route, samples[path], poses, draft.options.version)
         tendon = router.find_best()
@@ -102,8 +105,10 @@ def add_paths(draft: MjcfDraft) -> None:
         errors = _measure_errors(draft, tendon, test_poses, test_samples[path])
         # Exact tendons need no record.
         if any(error.max > EXACT_TOLERANCE_M for error in errors.values()):
-            approximation = "the tendon with the smallest error through the same points and around the same surfaces"
-            replacement = f"{approximation}, fitted" if fits else approximation
+            approximation = "a tendon through the same points and around the same surfaces, selected for the smallest error"
+            replacement = (
+                f"{approximation}, with fitted wrap geoms and sites" if fits else approximation
+            )
             draft.fidelity.add(
                 "path",
                 geometry_path,
@@ -152,17 +157,21 @@ def _describe_inexact_parts(route: ThroughPoints, router: Router) -> str:
             if NODE_TYPE.CONDITIONAL in point_types
             else []
         ),
-        *sorted({f"a {_SURFACE_NAMES[surface.law]}" for surface in touched}),
+        # The cylinder with its clause is the last.
+        *(
+            add_article(name)
+            for name in sorted({_SURFACE_NAMES[surface.law] for surface in touched}, reverse=True)
+        ),
     ]
-    several_note = ", and several surfaces" if len(touched) > 1 else ""
-    return "a path with " + " and ".join(result or ["surfaces"]) + several_note
+    start = "a path around several surfaces, with" if len(touched) > 1 else "a path with"
+    return f"{start} {join_words(result or ['surfaces'])}"
 
 
 _SURFACE_NAMES = {
-    "wrap_cylinder": "cylinder around which OpenSim's path is not the shortest",
-    "wrap_sphere": "sphere to wrap around",
-    "wrap_ellipsoid": "ellipsoid to wrap around",
-    "wrap_torus": "torus to wrap around",
+    "wrap_cylinder": "cylinder (OpenSim's path around it is not the shortest)",
+    "wrap_sphere": "sphere",
+    "wrap_ellipsoid": "ellipsoid",
+    "wrap_torus": "torus",
 }
 """Descriptions of surfaces that tendons only approximate, by the law of the surface."""
 

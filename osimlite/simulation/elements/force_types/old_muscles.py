@@ -5,6 +5,7 @@ from math import nan
 from typing import Any
 
 from osimlite.base.named_tuples import NamedTuple
+from osimlite.base.text import add_article
 from osimlite.mechanics.kernels.functions import evaluate_function
 from osimlite.mechanics.kernels.pointers import Floats
 from osimlite.mechanics.laws.deprecated_muscles import (
@@ -178,7 +179,9 @@ def compute_full_force(
 def _check_flags(builder: ElementBuilder, force: Any) -> None:
     # These classes have the flags of their base, but not the behaviour.
     for flag in ("ignore_tendon_compliance", "ignore_activation_dynamics"):
-        words = f"is true, which a {type(force).__name__} does not support; set it to false"
+        words = (
+            f"is true, which {add_article(type(force).__name__)} does not support; set it to false"
+        )
         Number(flag, lambda x: x == 0.0, words).read(builder, force)
 
 

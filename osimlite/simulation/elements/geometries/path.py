@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Protocol
 
+from osimlite.base.text import add_article
 from osimlite.mechanics.kernels.paths import last_length, path_length, pull_path
 from osimlite.mechanics.multibody.links import LinkMap
 from osimlite.simulation.elements.builder import ElementBuilder, get_class_name
@@ -58,7 +59,7 @@ class AlongPath(ForceGeometry):
         read_path = PATHS.find(type(force.geometry_path))
         if read_path is None:
             raise builder.make_unsupported_error(
-                force, f" on a {get_class_name(force.geometry_path)}"
+                force, f" on {add_article(get_class_name(force.geometry_path))}"
             )
         path: Path = read_path(builder, force)
         return path

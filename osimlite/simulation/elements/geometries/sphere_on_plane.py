@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from osimlite.base.text import add_article
 from osimlite.errors import ModelError
 from osimlite.mechanics.kernels.pointers import Floats, Ints
 from osimlite.mechanics.kernels.points import apply_force, direction, station, velocity
@@ -119,7 +120,8 @@ class SphereOnPlane(ForceGeometry):
             geometry = builder.resolve_target(force, field, getattr(force, field))
             if not isinstance(geometry, expected):
                 raise ModelError(
-                    f"the '{field}' of '{builder.path(force)}' is a {get_class_name(geometry)}; name a {expected.__name__}"
+                    f"the '{field}' of '{builder.path(force)}' is {add_article(get_class_name(geometry))}; "
+                    f"name {add_article(expected.__name__)}"
                 )
             surfaces.append(read_surface(builder, force, geometry, NO_MATERIAL))
         return surfaces[0], surfaces[1]
