@@ -123,7 +123,7 @@ def modify(
             "order",
             "length: rms, mm",
             "moment arms: rms, mm",
-            "largest of all, mm",
+            "largest error, mm",
         ):
             table.add_column(heading, justify="left" if heading == "path" else "right")
         for path_fit in sorted(fitted, key=lambda path_fit: -path_fit.worst_arm):
