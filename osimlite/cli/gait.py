@@ -61,7 +61,7 @@ def gait(
         Option(
             min=1,
             metavar="N",
-            help="A random or grid start counts as walking after this number of steps.",
+            help="With --perturb or --basin: the model counts as walking if it makes this number of steps.",
         ),
     ] = 20,
     basin: Annotated[
@@ -316,7 +316,10 @@ def _describe_cycle(result: GaitReport, files: Sequence[Path]) -> FactTable:
         # Large eigenvalues decide about stability; of high-dimensional models only the first six
         # are shown.
         sizes = ", ".join(f"{size:.3g}" for size in abs(cycle.multipliers[:6]))
-        facts.add("multipliers", f"{sizes} ...; without {cycle.neutral} neutral directions")
+        facts.add(
+            "multipliers",
+            f"{sizes} ...; {format_count(cycle.neutral, 'multiplier')} of neutral directions not shown",
+        )
         facts.add(
             "fixed point",
             f"residual {cycle.residual:.2g} after {format_count(cycle.iterations, 'Newton step')}",

@@ -72,7 +72,7 @@ def describe_fit(
             f"{name} ({100.0 * unseen_fraction:.3g} %)"
             for name, unseen_fraction in result["partly_unseen"].items()
         ]
-        yield f"unseen in some frames: {join_words(unseen_shares)}"
+        yield f"share of the frames without a measurement: {join_words(unseen_shares)}"
     if result["frames_unseen"]:
         frames = format_count(result["frames_unseen"], "frame")
         yield f"{frames} without a measurement of positive weight: these frames get the pose of the frame before"

@@ -208,7 +208,7 @@ class _Survey:
                     "massless-link",
                     path,
                     "a joint with several axes, or with an axis that does not pass through the origin of its child body",
-                    "several joints in a chain, each with one axis; the links between them have no mass (1e-9 kg in MuJoCo)",
+                    "several joints in a chain, each with one axis; the links between them have no mass",
                     f"links {' '.join(middle_links)}",
                 )
             coordinate_indices = {

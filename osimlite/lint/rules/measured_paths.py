@@ -241,8 +241,8 @@ def report_moving_point_range(subject: Subject, report: FindingCollector) -> Non
             )
         else:
             report(
-                f"{names} does not move outside the range of '{end.coordinate}' in OpenSim, but "
-                "OpenSim computes path speeds and moment arms there as if the point moved, by "
+                f"when '{end.coordinate}' is outside its range, OpenSim keeps {names} fixed, but "
+                "computes path speeds and moment arms as if the point moved, by "
                 f"{1000.0 * point.rate:.3g} mm per {end.unit or 'unit'} at {end}; keep the "
                 "coordinate in its range with a CoordinateLimitForce",
                 owner,

@@ -36,7 +36,7 @@ def report_unknown_name(setup: Setup, report: FindingCollector) -> None:
     Checks whether the model of the tool has every marker, coordinate, body, joint, muscle and
     actuator that the setup names. Names in set files that the setup reads are checked, too. Forces
     and markers that the tool adds count as parts of the model. In Moco studies the rule also checks
-    states, controls and outputs, which paths or patterns name.
+    the states, controls and outputs that the study names by path or pattern.
 
     Most tools reject the setup, some crash. OpenSim ignores missing markers of tasks, bodies of
     scale factors and muscles of an analysis without a message (warnings). It also ignores patterns
