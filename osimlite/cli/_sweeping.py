@@ -28,7 +28,7 @@ ReportInterval = Annotated[
     float | None,
     Option(
         metavar="SECONDS",
-        help="Time step of the motion from which measures (expressions, module:function) are computed.",
+        help="Time step of the motion for measures (expressions, module:function).",
         show_default="0.01 for expressions",
     ),
 ]
