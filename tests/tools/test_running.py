@@ -147,7 +147,7 @@ def test_only_files_are_run(setup: Path) -> None:
     for wrong in ([setup], osimlite.read_document(setup)):
         with pytest.raises(
             OsimliteError,
-            match=rf"expected the path of a setup file, found a {type(wrong).__name__}",
+            match=rf"expected the path of a setup file, found an? {type(wrong).__name__}",
         ):
             osimlite.run(wrong)  # type: ignore[arg-type]
     done = run("run", ".", folder=setup.parent)
