@@ -291,7 +291,7 @@ def create_motion(model: osimlite.Model, frames: int) -> RecordedMotion:
         info.default_value + 0.15 * np.sin(5.0 * times + index) * (info.motion_type == "rotational")
         for index, info in enumerate(mechanism.coordinates)
     ]
-    return RecordedMotion(mechanism, times, np.array(columns).T).assembled()
+    return RecordedMotion(mechanism, times, np.array(columns).T).assemble_poses()
 
 
 def create_rajagopal_kinematics(folder: Path, frames: int) -> ToolCase:

@@ -6,11 +6,9 @@ CasADi is imported when one of the names below is used for the first time.
 
 from __future__ import annotations
 
-import warnings
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from osimlite.base.lazy import make_lazy_getattr
-from osimlite.errors import DeprecatedWarning
 
 if TYPE_CHECKING:
     from osimlite.optimal.inverse import build_inverse_problem as build_inverse_problem
@@ -56,21 +54,4 @@ _DEPRECATED = {
 
 __all__ = [*_MODULES]
 
-_import_name = make_lazy_getattr(__name__, _MODULES)
-
-
-def __getattr__(name: str) -> Any:
-    """Import a public name when it is first used; warn if the name is deprecated.
-
-    Returns:
-        The function or class of that name.
-    """
-    current = _DEPRECATED.get(name)
-    if current is None:
-        return _import_name(name)
-    warnings.warn(
-        f"osimlite.moco.{name} is deprecated; use osimlite.moco.{current}",
-        DeprecatedWarning,
-        stacklevel=2,
-    )
-    return _import_name(current)
+__getattr__ = make_lazy_getattr(__name__, _MODULES, _DEPRECATED)

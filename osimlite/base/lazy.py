@@ -2,20 +2,31 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping
 from importlib import import_module
 from typing import Any
 
 
-def make_lazy_getattr(package: str, modules: Mapping[str, str]) -> Callable[[str], Any]:
+def make_lazy_getattr(
+    package: str, modules: Mapping[str, str], deprecated: Mapping[str, str] | None = None
+) -> Callable[[str], Any]:
     """Return the ``__getattr__`` of a package that imports its names when they are first used.
 
     Args:
         package: name of the package.
         modules: module of each name that the package offers.
+        deprecated: present names by their former ones, whose use warns.
     """
 
     def get(name: str) -> Any:
+        if deprecated is not None and name in deprecated:
+            from osimlite.errors import DeprecatedWarning
+
+            present = deprecated[name]
+            message = f"{package}.{name} is deprecated; use {package}.{present}"
+            warnings.warn(message, DeprecatedWarning, stacklevel=2)
+            name = present
         if name not in modules:
             raise AttributeError(f"module '{package}' has no attribute '{name}'")
         return getattr(import_module(modules[name]), name)

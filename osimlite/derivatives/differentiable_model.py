@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
+from osimlite.base.deprecation import make_deprecated_property
 from osimlite.base.records import replace
 from osimlite.derivatives.parameters import Parameters
-from osimlite.errors import DeprecatedWarning
 from osimlite.mechanics.kernels.layout import CONSTRAINED, MODEL
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.mechanism import Mechanism
@@ -109,21 +108,9 @@ class DifferentiableModel:
             int(self._packed.structure[at_equations + CONSTRAINED.EQUATIONS]) if at_equations else 0
         )
 
-    @property
-    def constraints_kept(self) -> int:
-        """Number of constraint equations, under the deprecated name of `constraint_count`."""
-        warnings.warn("use constraint_count", DeprecatedWarning, stacklevel=2)
-        return self.constraint_count
+    constraints_kept = make_deprecated_property("constraint_count")
 
-    @property
-    def in_system(self) -> tuple[str, ...]:
-        """Names of the states, under the deprecated name of `system_states`.
-
-        Returns:
-            Names in the order of Simbody's system.
-        """
-        warnings.warn("use system_states", DeprecatedWarning, stacklevel=2)
-        return self.system_states
+    in_system = make_deprecated_property("system_states")
 
     def _collect_forces(self, model: Model, mechanism: Mechanism) -> Forces:
         """Return the forces and probes of a model.

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from osimlite.base.deprecation import make_deprecated_method
 from osimlite.base.records import dataclass
 from osimlite.base.text import suggest_path
 from osimlite.derivatives.differentiable_model import DifferentiableModel
@@ -74,7 +75,7 @@ class Sensitivity(Tabular):
     motion: Array
     derivatives: Array
 
-    def of(self, state: str, number: str) -> Array:
+    def get_derivative(self, state: str, number: str) -> Array:
         """Return the derivative of a state by a number along the motion.
 
         Args:
@@ -94,6 +95,8 @@ class Sensitivity(Tabular):
         result: Array = self.derivatives[:, indices[0], indices[1]]
         return result
 
+    of = make_deprecated_method("get_derivative")
+
     @property
     def table(self) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
         """Derivatives as a table.
@@ -102,7 +105,7 @@ class Sensitivity(Tabular):
             The key column ``time`` (s), and columns ``STATE|NUMBER`` (n,), by name.
         """
         columns = {
-            f"{state}|{number}": self.of(state, number)
+            f"{state}|{number}": self.get_derivative(state, number)
             for state in self.states
             for number in self.numbers
         }
@@ -340,7 +343,7 @@ class _SensitivityRun:
         """
         expected_rates = np.array(self._engine.compute_derivative(t, y))[self._engine_indices]
         state = np.asarray(y)[self._engine_indices]
-        tangent_rates, _ = self._tangent_model.along(
+        tangent_rates, _ = self._tangent_model.differentiate_along(
             t, state, self._engine.read_controls(), np.zeros((len(state), 0))
         )
         differences = np.abs(tangent_rates - expected_rates)

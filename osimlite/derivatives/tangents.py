@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from osimlite.base.deprecation import make_deprecated_method
 from osimlite.base.records import replace
 from osimlite.derivatives.differentiable_model import DifferentiableModel
 from osimlite.derivatives.outputs import compute_output_columns, list_probe_items, locate_stations
@@ -179,7 +180,7 @@ class TangentModel(DifferentiableModel):
         # The numbers are linear in the parameters: their derivatives do not depend on p.
         numbers[self._parameter_rows] = self._slopes @ dp
 
-    def along(
+    def differentiate_along(
         self,
         t: float,
         x: Sequence[float] | Array,
@@ -232,6 +233,8 @@ class TangentModel(DifferentiableModel):
             machine.x[:, 1:] = 0.0
         return rates, result
 
+    along = make_deprecated_method("differentiate_along")
+
     @cached_property
     def output_names(self) -> dict[str, tuple[str, ...]]:
         """Names of the entries of each group of outputs; see `CasadiModel.outputs`.
@@ -275,7 +278,9 @@ class TangentModel(DifferentiableModel):
                     else 0.0
                 )
 
-        self.along(t, x, u, directions[:size], directions[size:], after_evaluation=store_outputs)
+        self.differentiate_along(
+            t, x, u, directions[:size], directions[size:], after_evaluation=store_outputs
+        )
         return y, slopes[:, :size], slopes[:, size:]
 
     def _compute_outputs(self) -> dict[str, tuple[list[str], list[Any]]]:
@@ -342,7 +347,7 @@ class TangentModel(DifferentiableModel):
             )
             speeds[:, direction_slice] = speed_changes - rates[:, column_slice]
 
-        self.along(
+        self.differentiate_along(
             t, x, self.u, directions[:size], None, directions[size:], after_evaluation=store_errors
         )
         # Only some equations restrict positions; the others restrict speeds alone.
@@ -373,7 +378,7 @@ class TangentModel(DifferentiableModel):
         directions = np.eye(size + len(u))
         if p is not None:
             self.take(p)
-        rates, slopes = self.along(t, x, u, directions[:size], directions[size:])
+        rates, slopes = self.differentiate_along(t, x, u, directions[:size], directions[size:])
         return rates, slopes[:, :size], slopes[:, size:]
 
     def steps(self, controls: Controls, dp: Array) -> TangentSteps:

@@ -238,12 +238,12 @@ def prepare_motion(
     recorded = RecordedMotion.from_source(mechanism, motion, times)
     # As in OpenSim, the complete record is filtered before a part is selected.
     if lowpass is not None:
-        recorded = recorded.lowpassed(lowpass)
+        recorded = recorded.apply_lowpass(lowpass)
     if not (start <= recorded.times[-1] and end >= recorded.times[0]):
         message = f"the motion has no row {format_time_span(start, end)}"
         raise SettingError(
             f"{message}; its rows go from {recorded.times[0]:g} to {recorded.times[-1]:g} s"
         )
     if start > -np.inf or end < np.inf:
-        recorded = recorded.between(start, end)
-    return recorded.assembled() if assemble else recorded
+        recorded = recorded.select_times(start, end)
+    return recorded.assemble_poses() if assemble else recorded

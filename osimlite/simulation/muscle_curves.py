@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from itertools import product
 from pathlib import Path
@@ -10,12 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from osimlite.base.deprecation import make_deprecated_method
 from osimlite.base.lazy import make_notebook_repr
 from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.records import dataclass, replace
 from osimlite.base.require import require
 from osimlite.base.text import format_count, join_words, suggest_name
-from osimlite.errors import DeprecatedWarning, SettingError, SimulationError
+from osimlite.errors import SettingError, SimulationError
 from osimlite.io.tables.tabular import Tabular
 from osimlite.mechanics.kernels.layout import OUTCOME, STAGE
 from osimlite.mechanics.multibody import build_mechanism
@@ -96,10 +96,7 @@ class MuscleCurves(Tabular):
         columns = {name: rows[:, list(indices)] for name, rows in self.columns.items()}
         return MuscleCurves(tuple(self.muscles[k] for k in indices), self.values, columns)
 
-    def of(self, indices: Sequence[int]) -> MuscleCurves:
-        """Return the same as :meth:`select_muscles`, under its deprecated name."""
-        warnings.warn("use select_muscles", DeprecatedWarning, stacklevel=2)
-        return self.select_muscles(indices)
+    of = make_deprecated_method("select_muscles")
 
     @property
     def table(self) -> tuple[Mapping[str, Array], Mapping[str, Array]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,10 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from osimlite.base.deprecation import make_deprecated_method
 from osimlite.base.files import make_folder, open_atomically
 from osimlite.base.progress import watch_items
 from osimlite.base.records import dataclass, field
-from osimlite.errors import DeprecatedWarning
 from osimlite.io.tables.storage import StoTable, write_sto
 from osimlite.io.tables.writers import format_control_set
 from osimlite.mechanics.multibody import build_mechanism
@@ -68,10 +67,7 @@ class MuscleForces(StoTable):
         assert self.shared is not None
         return self.shared.describe_unsolved()
 
-    def unsolved(self) -> str:
-        """Return the same as :meth:`describe_unsolved`, under its deprecated name."""
-        warnings.warn("use describe_unsolved", DeprecatedWarning, stacklevel=2)
-        return self.describe_unsolved()
+    unsolved = make_deprecated_method("describe_unsolved")
 
     def write(self, folder: str | Path) -> list[Path]:
         """Write activations, forces and controls, with the file names of OpenSim's analysis.
@@ -216,7 +212,7 @@ def _compute_states(
     speeds = all_speeds[np.searchsorted(times, recorded.times)]
     if not mechanism.constraints:
         return recorded.values, speeds, accelerations
-    assembled = recorded.assembled().values
+    assembled = recorded.assemble_poses().values
     if model.constraint_set.objects and not recorded.missing:
         # OpenSim uses the recorded speeds if all coordinates were recorded.
         return assembled, speeds, accelerations

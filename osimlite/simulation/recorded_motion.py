@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
+from osimlite.base.deprecation import make_deprecated_method
 from osimlite.base.progress import watch_items
 from osimlite.base.records import dataclass, replace
 from osimlite.base.text import format_count, join_words, suggest_name
@@ -291,7 +292,7 @@ class RecordedMotion(Movement):
         )
         return first, second
 
-    def lowpassed(self, cutoff: float, *, continued: bool = False) -> RecordedMotion:
+    def apply_lowpass(self, cutoff: float, *, continued: bool = False) -> RecordedMotion:
         """Return the motion after OpenSim's low-pass filter, at evenly spaced times.
 
         Args:
@@ -318,7 +319,7 @@ class RecordedMotion(Movement):
             self, times=times[is_inside], values=values[is_inside], around=(times, values)
         )
 
-    def between(self, first: float, last: float) -> RecordedMotion:
+    def select_times(self, first: float, last: float) -> RecordedMotion:
         """Return a part of the motion, at least one row.
 
         Args:
@@ -358,7 +359,7 @@ class RecordedMotion(Movement):
                 f"the motion has {format_count(count, 'time')}; {purpose} at least {2 * _HALF_SPLINE_ORDER}"
             )
 
-    def assembled(self) -> RecordedMotion:
+    def assemble_poses(self) -> RecordedMotion:
         """Return the motion with every pose moved to the nearest one that fulfils the constraints.
 
         Raises:
@@ -368,6 +369,10 @@ class RecordedMotion(Movement):
 
         poses = assemble_motion(self.mechanism, self.times, self.values)
         return RecordedMotion(self.mechanism, self.times, poses, self.missing, self.ignored)
+
+    assembled = make_deprecated_method("assemble_poses")
+    between = make_deprecated_method("select_times")
+    lowpassed = make_deprecated_method("apply_lowpass")
 
     def bodies(self) -> StoTable:
         """Return the positions of all mass centres and the orientations of all bodies.

@@ -197,9 +197,9 @@ def _read_coordinate_motion(
         )
     cutoff = setup.lowpass_cutoff_frequency_for_coordinates
     if cutoff >= 0.0:
-        recorded = recorded.lowpassed(cutoff, continued=True)
+        recorded = recorded.apply_lowpass(cutoff, continued=True)
     complete_motion = recorded
-    recorded = recorded.between(setup.initial_time, setup.final_time)
+    recorded = recorded.select_times(setup.initial_time, setup.final_time)
     # OpenSim uses the rates of the coordinates as speeds, before the constraints change the
     # values.
     speeds_path = job.find_path("speeds_file")

@@ -212,7 +212,7 @@ def satisfy_constraints(
     """
     if not simulation.constraints:
         return recorded.values, speeds
-    recorded = recorded.assembled()
+    recorded = recorded.assemble_poses()
     if not model.constraint_set.objects:
         # OpenSim projects the speeds only in this case.
         moments = [*zip(recorded.times.tolist(), recorded.values, speeds, strict=True)]

@@ -56,9 +56,9 @@ def run_inverse_dynamics_tool(job: Job, outcome: Outcome) -> None:
     cutoff = setup.lowpass_cutoff_frequency_for_coordinates
     if cutoff >= 0.0:
         # OpenSim's filter extends the motion; OpenSim treats the extension as measured.
-        recorded = recorded.lowpassed(cutoff, continued=True)
+        recorded = recorded.apply_lowpass(cutoff, continued=True)
     # After filtering, so that the filter sees the complete motion.
-    recorded = recorded.between(*expect_time_range(setup.time_range))
+    recorded = recorded.select_times(*expect_time_range(setup.time_range))
     for name in map(str, setup.forces_to_exclude):
         try:
             exclude_forces(model, [name])

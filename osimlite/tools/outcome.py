@@ -6,16 +6,16 @@ from collections.abc import Callable, Iterable
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
-from warnings import warn
 
 import numpy as np
 
+from osimlite.base.deprecation import make_deprecated_property
 from osimlite.base.progress import watch_items
 from osimlite.base.quantity import warn_caller
 from osimlite.base.records import dataclass, field, replace
 from osimlite.base.result_writing import ResultWriter
 from osimlite.base.text import format_count, join_words
-from osimlite.errors import DeprecatedWarning, DocumentError, SettingError, SimulationError
+from osimlite.errors import DocumentError, SettingError, SimulationError
 from osimlite.io.tables.old_storage import PRECISION, format_old_table
 from osimlite.io.tables.storage import StoTable, format_adapter_table
 from osimlite.lint.diagnostic import Finding
@@ -57,11 +57,7 @@ class Outcome:
     done: bool = True
     _texts: dict[Path, Iterable[str]] = field(default_factory=dict)
 
-    @property
-    def told(self) -> list[tuple[str, str]]:
-        """Former name of `messages`."""
-        warn("use messages", DeprecatedWarning, stacklevel=2)
-        return self.messages
+    told = make_deprecated_property("messages")
 
     def __repr__(self) -> str:
         status = "done" if self.done else "not done"

@@ -78,7 +78,7 @@ def to_bvh(
     values = np.asarray(mechanism.assemble({}), dtype=float)[None, :]
     if motion is not None:
         # Poses that violate constraints would tear the skeleton.
-        assembled = RecordedMotion.read(mechanism, motion).assembled()
+        assembled = RecordedMotion.read(mechanism, motion).assemble_poses()
         times, values = np.asarray(assembled.times), np.asarray(assembled.values)
     result = make_bvh(mechanism, times, values, scale=scale)
     fidelity = Fidelity(mechanism.name, "bvh")

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import warnings
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from osimlite.base.lazy import make_lazy_getattr
-from osimlite.errors import DeprecatedWarning
 
 if TYPE_CHECKING:
     from osimlite.view.animation import animate as animate
@@ -14,7 +12,7 @@ if TYPE_CHECKING:
     from osimlite.view.page import Story as Story
     from osimlite.view.plots import plot_simulation as plot_simulation
 
-_import_name = make_lazy_getattr(
+__getattr__ = make_lazy_getattr(
     __name__,
     {
         "ModelView": "osimlite.view.model_view",
@@ -22,20 +20,5 @@ _import_name = make_lazy_getattr(
         "animate": "osimlite.view.animation",
         "plot_simulation": "osimlite.view.plots",
     },
+    deprecated={"Shown": "ModelView"},
 )
-
-
-def __getattr__(name: str) -> Any:
-    """Import a public name when it is first used; warn if it is the deprecated name ``Shown``.
-
-    Returns:
-        The function or class of that name.
-    """
-    if name != "Shown":
-        return _import_name(name)
-    warnings.warn(
-        "osimlite.view.Shown is deprecated; use osimlite.view.ModelView",
-        DeprecatedWarning,
-        stacklevel=2,
-    )
-    return _import_name("ModelView")

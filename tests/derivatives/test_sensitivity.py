@@ -148,15 +148,15 @@ def test_numbers_are_named_and_found():
         pendulum(), ["/bodyset/rod/mass"], 0.1, states=[SPEED], report_interval=0.05
     )
     assert found.numbers == ("/bodyset/rod/mass", SPEED) and found.states == (ANGLE, SPEED)
-    assert np.array_equal(found.of(ANGLE, SPEED), found.derivatives[:, 0, 1])
+    assert np.array_equal(found.get_derivative(ANGLE, SPEED), found.derivatives[:, 0, 1])
     assert found.derivatives[0].tolist() == [[0.0, 0.0], [0.0, 1.0]]
     assert np.array_equal(found.motion[:, 0], found.trajectory.values[:, 0])
     rows, columns = found.table
     assert [*rows] == ["time"] and f"{ANGLE}|/bodyset/rod/mass" in columns and len(columns) == 4
     with pytest.raises(osimlite.OsimliteError, match="no number '/bodyset/rod/mas'; did you mean"):
-        found.of(ANGLE, "/bodyset/rod/mas")
+        found.get_derivative(ANGLE, "/bodyset/rod/mas")
     with pytest.raises(osimlite.OsimliteError, match=f"no state 'angle'; did you mean '{ANGLE}'"):
-        found.of("angle", SPEED)
+        found.get_derivative("angle", SPEED)
 
 
 def test_a_path_in_the_place_of_a_model_is_answered_with_how_to_read_it():
@@ -220,7 +220,7 @@ def test_a_start_that_is_bound_goes_with_a_number(held):
     found = osimlite.sensitivity(model, [number], 0.1, accuracy=1e-10, **choices)
     wanted = difference(model, found, number, 1e-4, 0.1, **choices)
     assert np.abs(found.derivatives[:, :, 0] - wanted).max() < 1e-7 * np.abs(wanted).max()
-    assert (found.of(angle, number)[0] == 0.0) == held
+    assert (found.get_derivative(angle, number)[0] == 0.0) == held
 
 
 def test_derivatives_that_are_no_numbers_are_told(monkeypatch):

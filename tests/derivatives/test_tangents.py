@@ -222,7 +222,7 @@ def test_whole_models(name):
     )
     # A direction has the same derivatives when it is evaluated alone.
     along = rng.normal(size=(size + len(u), 1))
-    _, change = made.along(0.3, x, u, along[:size], along[size:])
+    _, change = made.differentiate_along(0.3, x, u, along[:size], along[size:])
     assert (
         np.abs(change - np.hstack((a, b)) @ along).max()
         < 1e-12 * np.abs(np.hstack((a, b))).max() * np.abs(along).sum()
@@ -232,7 +232,9 @@ def test_whole_models(name):
     none = np.zeros((size, 0))
 
     def moved(h):
-        return made.along(0.3, x + h * along[:size, 0], u + h * along[size:, 0], none)[0]
+        return made.differentiate_along(
+            0.3, x + h * along[:size, 0], u + h * along[size:, 0], none
+        )[0]
 
     assert (
         np.abs(slope(moved, 1e-5) - change[:, 0]) / (sizes[:, 0] * np.abs(along).sum())
@@ -269,15 +271,17 @@ def test_parameters():
 
     def rates(p):
         made.take(np.array([p]))
-        return made.along(0.0, x, made.u, np.zeros((len(x), 0)))[0]
+        return made.differentiate_along(0.0, x, made.u, np.zeros((len(x), 0)))[0]
 
     mass = float(made.p[0])
     wanted = slope(lambda h: rates(mass + h), 1e-2)
     made.take(np.array([mass]))
-    _, found = made.along(0.0, x, made.u, np.zeros((len(x), 1)), None, np.ones((1, 1)))
+    _, found = made.differentiate_along(
+        0.0, x, made.u, np.zeros((len(x), 1)), None, np.ones((1, 1))
+    )
     assert np.abs(found[:, 0] - wanted).max() < 1e-9 * np.abs(wanted).max()
     # A direction of parameters does not remain for the next call.
-    assert not made.along(0.0, x, made.u, np.zeros((len(x), 1)))[1].any()
+    assert not made.differentiate_along(0.0, x, made.u, np.zeros((len(x), 1)))[1].any()
 
 
 def test_what_has_no_mass_has_no_accelerations():

@@ -133,7 +133,7 @@ def test_inverse_dynamics_through_the_filter(
     mechanism = recorded(corpus, name, times, noise=1e-3)
     theirs = inverse_dynamics("model.osim", "motion.mot", to=2.0, lowpass=cutoff)
     capfd.readouterr()
-    ours = RecordedMotion.read(mechanism, "motion.mot").lowpassed(cutoff).inverse_dynamics()
+    ours = RecordedMotion.read(mechanism, "motion.mot").apply_lowpass(cutoff).inverse_dynamics()
     assert ours.columns == theirs.columns
     # OpenSim's table includes the times by which the filter extends the data.
     same = np.abs(theirs.times[:, None] - ours.times).argmin(axis=0)

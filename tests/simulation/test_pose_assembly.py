@@ -141,7 +141,7 @@ def test_loops(fixtures) -> None:
     wanted = np.array((0.3, 0.6, 0.4, 0.3)) + 0.2 * rng.normal(size=(20, 4))
     compare(mechanism, wanted, accuracy=1e-8)
     compare(mechanism, wanted[: choose(1, 2)], Checked("Python"), accuracy=1e-8)
-    motion = RecordedMotion(mechanism, np.linspace(0.0, 1.0, 20), wanted).assembled()
+    motion = RecordedMotion(mechanism, np.linspace(0.0, 1.0, 20), wanted).assemble_poses()
     assert np.abs(motion.values - [mechanism.assemble(q) for q in wanted]).max() < 1e-8
     model["/constraintset/end"].location_body_1 = (9.0, 0.0, 0.0)
     with pytest.raises(

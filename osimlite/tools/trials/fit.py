@@ -406,7 +406,7 @@ def measure_filter(tool: TrialTool) -> Numbers:
     motion = tool.motion
     start, end = (min(max(time, motion.times[0]), motion.times[-1]) for time in tool.span)
     if tool.cutoff > 0.0:
-        filtered = motion.lowpassed(tool.cutoff)
+        filtered = motion.apply_lowpass(tool.cutoff)
         in_span = (motion.times >= start) & (motion.times <= end)
         most_changed, size, unit = "", 0.0, "deg"
         for index, info in enumerate(motion.mechanism.coordinates):

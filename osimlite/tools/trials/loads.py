@@ -249,7 +249,7 @@ def measure_weight(tool: TrialTool) -> Numbers:
     end = float(times[in_span][-1])
     mean = float(np.trapezoid(lift[in_span], times[in_span])) / (end - start)
     # Speeds of an unfiltered motion are mostly noise.
-    smooth = motion.lowpassed(tool.cutoff) if tool.cutoff > 0.0 else motion
+    smooth = motion.apply_lowpass(tool.cutoff) if tool.cutoff > 0.0 else motion
     speeds = [_compute_rising_speed(smooth, time, up) for time in (start, end)]
     # Newton's second law over the interval: mean lift = m (g + change of speed / duration).
     carried_mass = mean / (gravity + (speeds[1] - speeds[0]) / (end - start))
