@@ -9,7 +9,6 @@ from pathlib import Path
 
 from osimlite.base.files import get_relative_path
 from osimlite.base.progress import report_stage
-from osimlite.base.records import replace
 from osimlite.base.result_writing import ResultWriter
 from osimlite.base.text import add_article, format_count, join_words
 from osimlite.errors import (
@@ -137,7 +136,7 @@ def run(
     if check:
         report_stage("checking the setup")
         current_folder_files: dict[str, None] = {}
-        report = _shorten_paths(merge_reports(_check_documents(str(file), current_folder_files)))
+        report = merge_reports(_check_documents(str(file), current_folder_files))
         # OpenSim runs setups with some errors, and errors about replaced inputs do not matter.
         if errors := [
             e for e in report.errors if not (_is_run_by_opensim(e) or _is_about_any(e, replaced))
@@ -157,10 +156,10 @@ def run(
             tell(Report(misspelt, report.texts))
     run_tool = import_function(TOOLS[class_name])
     writer = ResultWriter.for_document(file, output, overwrite=overwrite, outside=write_outside)
+    job = Job(setup_object, file, None if output is None else Path(output), refine, simulates)
     try:
-        folder = None if output is None else Path(output)
         report_stage(f"{class_name}: computing")
-        run_tool(Job(setup_object, file, folder, refine, simulates), outcome)
+        run_tool(job, outcome)
         report_stage(f"{class_name}: writing results")
         outcome.write(file, writer)
     except OsimliteError as error:
@@ -169,12 +168,12 @@ def run(
 
         # The advice names an option of other commands, which this function lacks.
         error.message = error.message.replace(SKIP_ADVICE, NO_OPTION)
-        model_name = str(getattr(setup_object, "model_file", ""))
-        model_path = Job(setup_object, file).resolve_name(model_name)
-        if isinstance(error, ModelError) and not error.file and model_path is not None:
-            # The rules for models were not applied; they find more, and where it is in the file.
-            shown_path = get_relative_path(str(model_path), Path.cwd())
-            error.message += f"; 'osimlite validate {shown_path}' checks the model"
+        if isinstance(error, ModelError) and not error.file:
+            # The rules for models were not applied; they find more faults, with their positions.
+            model_name = str(getattr(setup_object, "model_file", ""))
+            if (model_path := job.resolve_name(model_name)) is not None:
+                shown_path = get_relative_path(str(model_path), Path.cwd())
+                error.message += f"; 'osimlite validate {shown_path}' checks the model"
         error.file = error.file or str(file)
         subject = load_subject(str(file), Config()) if isinstance(error, MissingFileError) else None
         if (
@@ -270,7 +269,8 @@ def _check_documents(setup: str, current_folder_files: dict[str, None]) -> Itera
             if real not in visited and (is_table(path) or path.lower().endswith(".xml")):
                 visited.add(real)
                 limit_documents(visited, setup)
-                document_paths.append(path)
+                # Reports show the path of a file in the current folder without "./".
+                document_paths.append(path.removeprefix(f"{os.curdir}{os.sep}"))
         # Rules about a document read the documents that it names: these are read once, for both. Plug-in
         # classes are those of the document that was loaded last.
         for path in document_paths:
@@ -279,18 +279,6 @@ def _check_documents(setup: str, current_folder_files: dict[str, None]) -> Itera
         yield checked(subject, measure=False)
         # Depth first: files that a document names come before those of the next document.
         waiting.extendleft(reversed(document_paths))
-
-
-def _shorten_paths(report: Report) -> Report:
-    """Return a report without "./" before names of files in the current folder."""
-    prefix = f"{os.curdir}{os.sep}"
-    findings = [
-        replace(finding, file=finding.file.removeprefix(prefix)) if finding.file else finding
-        for finding in report.findings
-    ]
-    return Report(
-        findings, {file.removeprefix(prefix): text for file, text in report.texts.items()}
-    )
 
 
 def _find_config(file: str) -> Config:
