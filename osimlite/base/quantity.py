@@ -14,6 +14,9 @@ from osimlite.errors import DoubtfulWarning, UnitWarning
 _FORM = compile_later(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(deg|rad|cm|mm|m)?(?:/s)?")
 _SIZES = {"deg": math.pi / 180.0, "rad": 1.0, "m": 1.0, "cm": 0.01, "mm": 0.001}
 
+LARGEST_JOINT_ANGLE = 10.0
+"""Angle (rad) that no joint reaches in a motion; larger numbers are probably in degrees."""
+
 
 class Quantity(NamedTuple):
     """Number with its unit, or with None if the user wrote no unit."""

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from osimlite.base.files import make_folder
+from osimlite.base.quantity import LARGEST_JOINT_ANGLE
 from osimlite.base.text import join_words
 from osimlite.cli._console import say
 from osimlite.io.tables.storage import StoTable, write_sto
@@ -50,10 +51,6 @@ def write_results(
     print_motion_summary(recorded, [folder / name for name in names])
 
 
-LARGEST_USUAL_ANGLE = 10.0
-"""Larger angles of a motion (rad) are usually degrees; OSIM847 has the same limit."""
-
-
 def print_motion_summary(recorded: RecordedMotion, files: Iterable[Path]) -> None:
     """Print the coordinates and times of a motion that were used, and the written files.
 
@@ -67,10 +64,10 @@ def print_motion_summary(recorded: RecordedMotion, files: Iterable[Path]) -> Non
         say(f"ignored columns, which are not coordinates: {join_words(recorded.ignored)}")
     is_rotational = [info.motion_type == "rotational" for info in recorded.mechanism.coordinates]
     largest = abs(recorded.values[:, is_rotational]).max(initial=0.0)
-    if largest > LARGEST_USUAL_ANGLE:
+    if largest > LARGEST_JOINT_ANGLE:
         say(
-            f"the largest angle is {largest:.4g} rad; if the motion is in degrees, write inDegrees=yes in the header "
-            "of its file"
+            f"the largest angle is {largest:.4g} rad; if the motion is in degrees, write "
+            "inDegrees=yes in the header of its file"
         )
     times = recorded.times
     paths = join_words([str(file) for file in files])

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from itertools import chain
 from typing import Any
 
+from osimlite.base.quantity import LARGEST_JOINT_ANGLE
 from osimlite.base.text import join_words
 from osimlite.lint.posture import coordinate_name, find_angles
 from osimlite.lint.registry import ERROR, WARNING, FindingCollector, rule
@@ -77,7 +78,7 @@ def report_impossible_bounds(setup: Setup, report: FindingCollector) -> None:
                 info.name.endswith("/value")
                 # Bounds of speeds and of translations may well be larger.
                 and coordinate_name(info.name) in angles
-                and largest > 10.0
+                and largest > LARGEST_JOINT_ANGLE
             ):
                 report(
                     f"a bound of {largest:g} for the angle '{info.name}' is read in radians: is "

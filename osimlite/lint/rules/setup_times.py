@@ -7,6 +7,7 @@ import os
 from collections.abc import Iterator
 from typing import Any
 
+from osimlite.base.quantity import LARGEST_JOINT_ANGLE
 from osimlite.io.tables.headers import MarkerHeader
 from osimlite.lint.diagnostic import Severity
 from osimlite.lint.posture import coordinate_name, find_angles
@@ -416,8 +417,8 @@ def report_motion_in_degrees(setup: Setup, report: FindingCollector) -> None:
                 item,
                 tag=tag,
             )
-        # No joint turns by 10 rad (573 degrees), while a gait has knee angles of 60 degrees.
-        elif largest > 10.0 and not header.in_degrees:
+        # 10 rad are 573 degrees, while a gait in degrees has knee angles of 60.
+        elif largest > LARGEST_JOINT_ANGLE and not header.in_degrees:
             report(
                 f"'{getattr(item, tag)}' does not say inDegrees=yes, but '{label}' reaches "
                 f"{largest:.4g}: OpenSim reads this in radians",
