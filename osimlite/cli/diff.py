@@ -53,14 +53,14 @@ def diff(
         title, (old_file, new_file) = "", files
     else:
         raise OsimliteError("diff takes two files")
-    if all(is_table(str(file)) for file in (old_file, new_file) if str(file) != "/dev/null"):
+    existing_files = [file for file in (old_file, new_file) if str(file) != "/dev/null"]
+    are_tables = [is_table(str(file)) for file in existing_files]
+    if all(are_tables):
         from osimlite.cli._table_diff import describe_table_differences
 
         lines = describe_table_differences(old_file, new_file)
-    elif any(is_table(str(file)) for file in (old_file, new_file)) and not any(
-        str(file) == "/dev/null" for file in (old_file, new_file)
-    ):
-        table, other = (old_file, new_file) if is_table(str(old_file)) else (new_file, old_file)
+    elif any(are_tables):
+        table, other = existing_files if are_tables[0] else reversed(existing_files)
         raise OsimliteError(
             f"'{table}' is a table and '{other}' is not; name two tables, or two models or setups"
         )
