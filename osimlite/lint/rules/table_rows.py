@@ -296,12 +296,11 @@ def report_time_gap(table: Table, report: FindingCollector) -> None:
     if len(gaps) <= max(1, len(steps) // 50) and even_count + len(gaps) >= 0.95 * len(steps):
         # The first twenty gaps show the cause.
         for row in gaps[:20]:
-            missing_count = steps[row - 1] / table.step - 1
-            loss_note = (
-                f": {format_count(round(missing_count), 'row')} {'seems' if round(missing_count) == 1 else 'seem'} to be missing"
-                if 0.5 <= missing_count < 1e9
-                else ""
-            )
+            loss_note = ""
+            if (missing_ratio := steps[row - 1] / table.step - 1) < 1e9:
+                missing_count = max(1, round(missing_ratio))
+                verb = "seems" if missing_count == 1 else "seem"
+                loss_note = f": {format_count(missing_count, 'row')} {verb} to be missing"
             report(
                 f"from one row to the next {steps[row - 1]:.6g} s pass, usually {table.step:.6g} "
                 f"s{loss_note}",
