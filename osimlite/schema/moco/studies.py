@@ -161,7 +161,7 @@ class MocoDirectCollocationSolver(MocoSolver, abstract=True):
     minimize_lagrange_multipliers: Flag = False
     """Whether multipliers of constraints are a cost."""
     lagrange_multiplier_weight: Number = 1.0
-    """Weight of that cost."""
+    """Weight of the cost of multipliers."""
     kinematic_constraint_method: Annotated[str, word("Posa2016", "Bordalba2023")] = "Posa2016"
     """Method for the model's constraints, by the names of its authors."""
 
@@ -188,17 +188,17 @@ class MocoCasADiSolver(MocoDirectCollocationSolver):
     minimize_implicit_multibody_accelerations: Flag = False
     """Whether accelerations that are variables are a cost."""
     implicit_multibody_accelerations_weight: Number = 1.0
-    """Weight of that cost."""
+    """Weight of the cost of accelerations."""
     minimize_implicit_auxiliary_derivatives: Flag = False
     """Whether derivatives of auxiliary states that are variables are a cost."""
     implicit_auxiliary_derivatives_weight: Number = 1.0
-    """Weight of that cost."""
+    """Weight of the cost of derivatives of auxiliary states."""
     enforce_path_constraint_mesh_interior_points: Flag = False
     """Whether path constraints are met within intervals too."""
     minimize_state_projection_distance: Flag = True
     """Whether the distance by which states are projected onto the constraints is a cost."""
     state_projection_distance_weight: Number = 1e-6
-    """Weight of that cost."""
+    """Weight of the cost of the projection distance."""
     projection_slack_variable_bounds: Single[MocoBounds] = make_default(
         MocoBounds, name="projection_slack_variable_bounds", bounds=(-0.001, 0.001)
     )
@@ -295,6 +295,6 @@ class MocoTrack(MocoTool):
     minimize_control_effort: Flag = True
     """Whether squares of controls are a cost."""
     control_effort_weight: Number = 0.001
-    """Weight of that cost."""
+    """Weight of the cost of controls."""
     controls_weight_set: ControlWeights = make_default(MocoWeightSet, name="controls_weight_set")
     """Weights by paths of controls."""

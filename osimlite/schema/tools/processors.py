@@ -104,7 +104,7 @@ class ModOpScaleMaxIsometricForce(ModelOperator):
     """Scales the maximum isometric forces of muscles."""
 
     scale_factor: Number = 1.0
-    """Factor of their maximum isometric forces."""
+    """Factor of the maximum isometric force of each muscle."""
 
 
 class ModOpTendonComplianceDynamicsModeDGF(ModelOperator):
