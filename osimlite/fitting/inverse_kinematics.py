@@ -51,8 +51,7 @@ def inverse_kinematics(
     Args:
         model: model with markers named as the measured ones, and frames named as the sensors.
         markers: path of a .trc, .c3d or .sto file, or arrays (t, 3) by name in ground, m; NaN where
-            a
-            marker was not seen.
+            a marker was not seen.
         orientations: a .sto file of quaternions, or arrays by name: quaternions (t, 4), scalar
             first, or rotation matrices (t, 3, 3) from the axes of a sensor to ground; NaN where one
             was not measured. Without markers, translational coordinates keep their default values,
@@ -61,8 +60,8 @@ def inverse_kinematics(
         weights: weights of markers and sensors by name; the others have weight 1, and weight 0
             excludes.
         coordinates: weights (1/rad², 1/m²) with which coordinates keep their default values, or
-            weights and target values (rad or m), by name. A weight of 1 is large compared
-            with the mean over the markers.
+            weights and target values (rad or m), by name. A weight of 1 is large compared with the
+            mean over the markers.
         constraints: whether the constraints of the model hold.
         start: first time, s.
         end: last time, s.

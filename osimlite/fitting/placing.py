@@ -82,9 +82,9 @@ def place_markers(
     mean = MarkerData(
         data.names, np.array((start,)), data.positions[is_in_range].mean(axis=0)[None], data.file
     )
-    mean_positions = data.positions[select_frames(data.times, start, end)]
-    is_measured = np.asarray(np.isfinite(mean_positions).all(axis=2))
-    selected = np.where(is_measured[..., None], mean_positions, 0.0)
+    frame_positions = data.positions[select_frames(data.times, start, end)]
+    is_measured = np.asarray(np.isfinite(frame_positions).all(axis=2))
+    selected = np.where(is_measured[..., None], frame_positions, 0.0)
     # A marker that is never seen has NaN as its mean, and stays.
     with np.errstate(invalid="ignore"):
         target = dict(

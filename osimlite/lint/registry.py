@@ -92,7 +92,7 @@ class FindingCollector:
             suggestion: text that would be right at this position.
             certain: whether the suggestion is certainly right.
             fix: change of the text that removes the finding.
-            **where: further arguments of :meth:`Subject.position`.
+            **location: further arguments of :meth:`Subject.position`.
         """
         rule = self.rules.get(fault)
         subject = self.subject

@@ -61,7 +61,7 @@ class FileCache(Generic[T]):
         return entry is not None and entry[0] == get_file_stamp(path)
 
     def keep(self, path: str, result: T) -> None:
-        """Store the result for the current content of a file that was computed elsewhere.
+        """Store a result that was computed elsewhere from the current content of a file.
 
         Args:
             path: path of the file.

@@ -22,7 +22,7 @@ from osimlite.schema.registry import cache_by_tags, find_class
 from osimlite.schema.specs import FieldSpec, get_defaults, get_field_specs
 
 ReadObject = TypeVar("ReadObject", bound=Object)
-IncludeResult = Callable[[str, type[Object]], tuple[Object, Include, list[Note]] | str]
+IncludeReader = Callable[[str, type[Object]], tuple[Object, Include, list[Note]] | str]
 """Function that reads the object of a class from a file.
 
 It returns the object, the include and notes, or the reason why the file is not read, such as
@@ -125,7 +125,7 @@ class ObjectReader:
         home: link to the model that the objects will belong to.
     """
 
-    def __init__(self, read_include: IncludeResult | None = None) -> None:
+    def __init__(self, read_include: IncludeReader | None = None) -> None:
         self.count = 0
         self.notes: list[Note] = []
         self.defaults: dict[type[Object], Object] = {}

@@ -26,7 +26,7 @@ from osimlite.errors import (
 from osimlite.io.document.names import decode_name
 from osimlite.io.document.notes import Note
 from osimlite.io.document.objects import (
-    IncludeResult,
+    IncludeReader,
     ObjectReader,
     add_comment,
     count_elements,
@@ -359,9 +359,9 @@ def _check_leftovers(source: Source, version: int, notes: list[Note]) -> None:
         return
     tags = ", ".join(f"<{tag}>" for tag in sorted({note.word for note in unknown_notes})[:8])
     message = (
-        f"document version {version} is older than {FIRST_COMPLETE_VERSION}, and osimlite cannot convert "
-        f"{tags} of such documents, which would "
-        "be lost; remove it, or open and save the model with OpenSim 2"
+        f"document version {version} is older than {FIRST_COMPLETE_VERSION}, and osimlite cannot "
+        f"convert {tags} of such documents, which would be lost; remove it, or open and save the "
+        "model with OpenSim 2"
     )
     raise make_version_error(source, version, message, unknown_notes[0].number)
 
@@ -418,7 +418,7 @@ def _read_top(
 
 def _make_include_reader(
     source: Source, around: tuple[str, ...] = (), read: list[int] | None = None
-) -> IncludeResult | None:
+) -> IncludeReader | None:
     """Return a function that reads objects named by ``file`` attributes, from files relative to the text's.
 
     A text without a file includes nothing. As in OpenSim, a file that cannot be read, has another

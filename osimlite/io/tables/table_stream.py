@@ -73,12 +73,11 @@ class TableStream:
                     last_time = time
                     yield time, row
                 continue
-            text = line
             try:
                 # The fast path: nearly all rows are plain numbers.
-                row = list(map(float, text.split()))
+                row = list(map(float, line.split()))
             except ValueError:
-                row = self._parse_special_row(text, number)
+                row = self._parse_special_row(line, number)
             if not row:
                 continue
             if len(row) != size:
@@ -88,7 +87,7 @@ class TableStream:
                     line=number,
                     column=len(line.rstrip()) + 1
                     if len(row) < size
-                    else find_word_start(text, size),
+                    else find_word_start(line, size),
                 )
             # The time may be in any column in files of version 1.
             time = row.pop(time_column)

@@ -104,8 +104,8 @@ def format_control_set(table: StoTable) -> Iterator[str]:
 
     yield _START
     for name, values in zip(table.columns, table.rows.T, strict=True):
-        is_finite = ~np.isnan(values)
-        nodes = np.column_stack([table.times[is_finite], values[is_finite]])
+        has_value = ~np.isnan(values)
+        nodes = np.column_stack([table.times[has_value], values[has_value]])
         yield _BEFORE.format(name=quoteattr(name))
         yield _NODE * len(nodes) % tuple(nodes.ravel().tolist())
         yield _AFTER
