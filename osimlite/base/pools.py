@@ -169,9 +169,8 @@ def _report_lost_workers() -> Iterator[None]:
     except BrokenExecutor:
         # New processes import the main module of the program again.
         raise WorkerLostError(
-            "a worker process of the sweep has ended unexpectedly; in a script, start the sweep under if "
-            "__name__ == '__main__':, and "
-            "continue an interrupted sweep with --resume"
+            "a worker process of the sweep has ended unexpectedly; in a script, start the sweep "
+            "under if __name__ == '__main__':, and continue an interrupted sweep with --resume"
         ) from None
 
 

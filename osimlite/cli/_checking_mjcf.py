@@ -31,8 +31,7 @@ def print_mjcf_check(file: Path, mjcf: Path, output: Path | None) -> None:
     if result.coordinates:
         say(
             f"the file has no joint for {join_words(list(result.coordinates), max_count=6)}; these "
-            "coordinates do not move in the "
-            "comparison"
+            "coordinates do not move in the comparison"
         )
     if result.bodies is not None:
         say(

@@ -89,9 +89,9 @@ class Request:
         source_format = find_format(file) if source is None else source
         if source_format is None and is_table(str(file)):
             raise SettingError(
-                f"'{file.name}' is a table of OpenSim, and 'convert' does not convert tables alone; to "
-                "convert the table together "
-                "with its model, name the model first and add --motion"
+                f"'{file.name}' is a table of OpenSim, and 'convert' does not convert tables "
+                "alone; to convert the table together with its model, name the model first and "
+                "add --motion"
             )
         if source_format is None:
             raise SettingError(

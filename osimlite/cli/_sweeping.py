@@ -18,9 +18,9 @@ Vary = Annotated[
         "--vary",
         metavar="NAME=RANGE",
         help="NAME: a coordinate, COORDINATE/speed, MUSCLE/control, COMPONENT/PROPERTY, or a parameter of the model "
-        "function or controller. Without --vary, all parameters of the controller vary. "
-        "RANGE: LOW:HIGH, LOW:HIGH:log, or LOW:HIGH:COUNT in a sweep. "
-        "Wildcards, factors, controls over time: docs/sweeps.md.",
+        "function or controller. Without --vary, all parameters of the controller vary. RANGE: "
+        "LOW:HIGH, LOW:HIGH:log, or LOW:HIGH:COUNT in a sweep. Wildcards, factors, controls over "
+        "time: docs/sweeps.md.",
         show_default=False,
     ),
 ]

@@ -51,9 +51,8 @@ def describe_fit(
         advice_text += "; check the units of the data" if rms > IMPLAUSIBLE_ERROR_M else ""
         yield (
             f"{format_count(result['frames'], 'frame')}, "
-            f"{format_count(result['markers'], 'marker')}: "
-            f"errors of {100.0 * rms:.2f} cm (root mean square), "
-            f"at most {100.0 * largest:.2f} cm ({result['worst_marker']} at "
+            f"{format_count(result['markers'], 'marker')}: errors of {100.0 * rms:.2f} cm (root "
+            f"mean square), at most {100.0 * largest:.2f} cm ({result['worst_marker']} at "
             f"{result['worst_time']:g} s){advice_text}"
         )
     if "rms_orientation_error" in result:
@@ -78,10 +77,9 @@ def describe_fit(
         yield f"{frames} without a measurement of positive weight: these frames get the pose of the frame before"
     if motion.undetermined:
         yield (
-            f"{UNDETERMINED} "
-            f"{join_words(motion.undetermined, max_count=MAX_NAMED_COORDINATES)}, which stay near the "
-            "default pose; OpenSim may find other values, such as the middle of their ranges. Lock "
-            "them, or add tasks for them"
+            f"{UNDETERMINED} {join_words(motion.undetermined, max_count=MAX_NAMED_COORDINATES)}, "
+            "which stay near the default pose; OpenSim may find other values, such as the middle "
+            "of their ranges. Lock them, or add tasks for them"
         )
     if result["frames_unsettled"]:
         yield f"the solver did not converge in {format_count(result['frames_unsettled'], 'frame')}"

@@ -91,8 +91,7 @@ class Measurements:
         file_note = f" of '{self.file}'" if self.file else ""
         return SettingError(
             f"no frame{file_note} lies {format_time_span(start, end)}; the data are from "
-            f"{self.times[0]:g} to "
-            f"{self.times[-1]:g} s"
+            f"{self.times[0]:g} to {self.times[-1]:g} s"
         )
 
     def select_values(self, names: Sequence[str]) -> Array:

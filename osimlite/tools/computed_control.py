@@ -348,9 +348,8 @@ class ComputedControl:
         if missing_accelerations:
             result.failure = (
                 f"the actuators cannot produce the accelerations that the tasks need at {t:g} s; "
-                f"missing: {missing_accelerations} "
-                "(rad/s², m/s²). Append reserve actuators, widen the bounds of the controls, or lower "
-                "the weights"
+                f"missing: {missing_accelerations} (rad/s², m/s²). Append reserve actuators, widen "
+                "the bounds of the controls, or lower the weights"
             )
             return lower
         if self.has_states:

@@ -48,10 +48,9 @@ def run_inverse_dynamics_tool(job: Job, outcome: Outcome) -> None:
     if by_path:
         outcome.add_warning(
             "columns",
-            f"'{setup.coordinates_file}' names {join_words(by_path)} by paths. osimlite "
-            "reads these columns. OpenSim's "
-            "inverse dynamics uses the default values of these coordinates instead, so its moments "
-            "differ",
+            f"'{setup.coordinates_file}' names {join_words(by_path)} by paths. osimlite reads "
+            "these columns. OpenSim's inverse dynamics uses the default values of these "
+            "coordinates instead, so its moments differ",
         )
     cutoff = setup.lowpass_cutoff_frequency_for_coordinates
     if cutoff >= 0.0:

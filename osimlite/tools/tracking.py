@@ -164,8 +164,8 @@ def _apply_locks(
             outcome.add_message(
                 info.name,
                 f"locked at {info.default_value:g} {unit}, up to {deviation:.3g} {unit} from the "
-                "desired motion; "
-                "as in OpenSim, the coordinate stays locked, and a task for it has no effect",
+                "desired motion; as in OpenSim, the coordinate stays locked, and a task for it "
+                "has no effect",
             )
 
 

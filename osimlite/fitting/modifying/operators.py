@@ -154,9 +154,9 @@ def _replace_with_degroote(model: Model, operator: Any, folder: Path) -> None:
             }
         else:
             raise UnsupportedError(
-                f"'{muscle.name}' is {add_article(type(muscle).__name__)}, which no DeGrooteFregly2016Muscle "
-                "replaces with the same "
-                "behavior; Thelen2003Muscle and Millard2012EquilibriumMuscle can be replaced"
+                f"'{muscle.name}' is {add_article(type(muscle).__name__)}, which no "
+                "DeGrooteFregly2016Muscle replaces with the same behavior; Thelen2003Muscle and "
+                "Millard2012EquilibriumMuscle can be replaced"
             )
         for name in (
             "default_activation",

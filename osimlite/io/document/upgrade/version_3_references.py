@@ -265,9 +265,8 @@ def convert_point_coordinates(draft: Draft) -> None:
                 draft.record_refusal(
                     point,
                     child,
-                    f"OpenSim understands coordinate '{name}' as '{opensim_paths[name]}', the first element "
-                    "of that name, and not as "
-                    f"'{paths[name]}'",
+                    f"OpenSim understands coordinate '{name}' as '{opensim_paths[name]}', the "
+                    f"first element of that name, and not as '{paths[name]}'",
                 )
             draft.rename(child, f"socket_{child.tag}")
         if result:
