@@ -12,8 +12,9 @@ import pytest
 import osimlite
 from osimlite.errors import DocumentError, MissingFileError
 from osimlite.io.tables.c3d import read_c3d_forces
-from osimlite.io.tables.storage import write_sto
+from osimlite.io.tables.storage import StoTable, write_sto
 from osimlite.models.dynamic_walker import dynamic_walker
+from osimlite.simulation.elements import external_loads
 from osimlite.simulation.elements.external_loads import read_external_loads
 
 pytest.importorskip("ezc3d", reason="needs ezc3d (extra 'c3d')")
@@ -81,3 +82,19 @@ def test_what_has_no_forces_is_told(tmp_path: Path) -> None:
     (tmp_path / "torn.c3d").write_bytes(b"no file of motion capture")
     with pytest.raises(DocumentError, match="cannot be read"):
         read_c3d_forces(tmp_path / "torn.c3d")
+
+
+def test_a_c3d_file_is_read_once_for_all_loads(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shutil.copy(TRIALS / "force_plate.c3d", tmp_path / "trial.c3d")
+    paths = []
+
+    def read(path: str) -> StoTable:
+        paths.append(path)
+        return read_c3d_forces(path)
+
+    monkeypatch.setattr(external_loads, "read_c3d_forces", read)
+    first, second = (external_loads.read_measured_times(tmp_path / "trial.c3d") for _ in range(2))
+    assert len(paths) == 1
+    assert first is second

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from osimlite.base.text import find_nearest, join_words
+from osimlite.base.text import add_article, find_nearest, join_words
 from osimlite.errors import DocumentError, ModelError, SettingError
 from osimlite.io.document.cache import cache_by_file, read_object
 from osimlite.io.tables.c3d import ENDING, read_c3d_forces
@@ -78,11 +78,10 @@ def build_external_loads(
     for body, several in applied_to.items():
         for number, names in enumerate(several, start=1):
             if not 1 <= len(names) <= len(PARTS) or not names[0]:
-                message = (
+                raise SettingError(
                     f"the load on '{body}' is {list(names)}; expected one to three prefixes of column labels: "
-                    "that of the force"
+                    "that of the force, then that of the point, then that of the moment"
                 )
-                raise SettingError(f"{message}, then that of the point, then that of the moment")
             identifiers: Any = {
                 f"{part}_identifier": text for part, text in zip(PARTS, names, strict=False)
             }
@@ -128,9 +127,7 @@ def read_external_loads(
     for item in members:
         if not isinstance(item, ExternalForce):
             kind = getattr(item, "class_name", "") or type(item).__name__
-            message = (
-                f"'{item.name}' is a {kind}, which OpenSim refuses here; make it an ExternalForce"
-            )
+            message = f"'{item.name}' is {add_article(kind)}, which OpenSim refuses here; make it an ExternalForce"
             raise DocumentError(message, file=file)
     forces = [force for force in loads.objects if force.appliesForce]
     columns = _Columns(read_loads_table(loads, folder, file), forces)
@@ -188,25 +185,23 @@ def read_loads_table(loads: ExternalLoads, folder: Path, file: str | None) -> St
         folder: folder in which the data file is searched first.
         file: file of the loads, for messages.
 
-    Returns:
-        The table; a .c3d file is converted to forces, points and torques.
-
     Raises:
         DocumentError: the loads name no data file, or it cannot be read.
     """
     name = loads.datafile.strip()
     if name in ("", "Unassigned"):
         raise DocumentError("it names no data file; give it a <datafile>", file=file)
-    path = find_named_file(folder, name)
-    return (
-        read_c3d_forces(path)
-        if path.suffix.lower() == ENDING
-        else _read_cached_table(str(path)) or read_sto(path)
-    )
+    path = str(find_named_file(folder, name))
+    return _read_cached_table(path) or _read_table(path)
 
 
-_read_cached_table = cache_by_file(4)(read_sto)
-"""Cached reader, since each of the loads reads the same table."""
+def _read_table(path: str) -> StoTable:
+    """Read a table of forces; a .c3d file is converted to forces, points and torques."""
+    return read_c3d_forces(path) if Path(path).suffix.lower() == ENDING else read_sto(path)
+
+
+_read_cached_table = cache_by_file(4)(_read_table)
+"""Cached reader, since each of the loads, and a check of their times, read the same table."""
 
 
 def _read_load(
