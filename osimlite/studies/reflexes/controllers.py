@@ -200,9 +200,8 @@ class Reflexes:
         """Read the thresholds of a GaitStateController and its conditional reflexes."""
         parameters.auto_std_factor = node.number("auto_std_factor", parameters.auto_std_factor)
         self.symmetric = node.flag("symmetric", True)
-        for key in ("use_model_com_reference_pos", "omnidirectional"):
-            if node.flag(key, False):
-                raise node.error(f"osimlite does not support '{key}'; leave it out")
+        options = ("use_model_com_reference_pos", "omnidirectional")
+        node.refuse_flags("a GaitStateController", options)
         self._swings_from_stance = node.flag("allow_stance_swing_transition", False)
         self._limits[:, LIMITS.DELAY] = (
             node.number("leg_load_sensor_delay", 0.0) / self.walkers.step
@@ -325,9 +324,8 @@ class Reflexes:
             Index of the actuator, index of the source, and prefix of the parameters.
         """
         # Refused explicitly, as ignoring them would change the walk silently.
-        for key in ("min_control_value", "max_control_value", *reflex_type.refused):
-            if node.get(key) is not None:
-                raise node.error(f"osimlite does not support '{key}' of reflexes; leave it out")
+        keys = ("min_control_value", "max_control_value", *reflex_type.refused)
+        node.refuse_parts("reflexes", keys)
         target = node.text("target")
         source = node.text("source", target if reflex_type.defaults_to_target else None)
 

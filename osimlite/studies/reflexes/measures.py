@@ -234,12 +234,8 @@ class GaitMeasure(Measure):
         self.first_steps = int(node.number("initiation_steps", 2.0))
         self.least_speed = node.number("min_norm_velocity", 0.1)
         self.always = node.flag("always_apply_early_termination_penalty", False)
-        for key in ("use_height_wrt_feet", "use_initial_heading"):
-            if node.flag(key, False):
-                raise node.error(f"osimlite does not support '{key}'; leave it out")
-        for key in ("continue_after_fall", "base_bodies", "direction"):
-            if node.get(key) is not None:
-                raise node.error(f"osimlite does not support '{key}'; leave it out")
+        node.refuse_flags("a GaitMeasure", ("use_height_wrt_feet", "use_initial_heading"))
+        node.refuse_parts("a GaitMeasure", ("continue_after_fall", "base_bodies", "direction"))
         self.walkers.expect_legs()
         numbers = (("termination_height", 0.5), ("load_threshold", 0.1), ("min_step_duration", 0.1))
         self._first = self.criteria.add(
@@ -298,11 +294,10 @@ class JumpMeasure(Measure):
 
     def read(self, node: SettingNode) -> None:
         """Read when a jump starts and ends."""
-        for key in ("jump_type", "jump_angle", "body", "target_body", "offset", "recover_time"):
-            if node.get(key) is not None:
-                raise node.error(
-                    f"osimlite does not support '{key}' of a JumpMeasure; leave it out"
-                )
+        node.refuse_parts(
+            "a JumpMeasure",
+            ("jump_type", "jump_angle", "body", "target_body", "offset", "recover_time"),
+        )
         self.walkers.expect_legs()
         self.negates = node.flag("negate_result", False)
         at_peak = node.flag("terminate_on_peak", True)
@@ -510,8 +505,7 @@ class CompositeMeasure(Measure):
 
     def read(self, node: SettingNode) -> None:
         """Read the parts; with `dual_sided` or `symmetric` there is one of each part for either side."""
-        if node.flag("use_first_non_zero_result", False):
-            raise node.error("osimlite does not support 'use_first_non_zero_result'; leave it out")
+        node.refuse_flags("a CompositeMeasure", ("use_first_non_zero_result",))
         # `symmetric` applies where `dual_sided` is not set.
         is_dual_sided = node.flag("dual_sided", node.flag("symmetric", False))
         blocks = [node, *(block for _, block in node.select_all("Measures"))]

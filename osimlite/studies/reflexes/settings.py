@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
@@ -202,6 +202,32 @@ class SettingNode:
     def error(self, message: str) -> DocumentError:
         """Return an error that points at this node."""
         return DocumentError(message, file=self.file, line=self.line or None)
+
+    def refuse_parts(self, owner: str, keys: Iterable[str]) -> None:
+        """Refuse settings of SCONE that osimlite does not support.
+
+        Args:
+            owner: description of the object that the settings belong to, for the message.
+            keys: keys of the settings.
+
+        Raises:
+            DocumentError: a part has one of these keys.
+        """
+        for key in keys:
+            if self.get(key) is not None:
+                raise self.error(f"osimlite does not support '{key}' of {owner}; leave it out")
+
+    def refuse_flags(self, owner: str, keys: Iterable[str]) -> None:
+        """Refuse options of SCONE that osimlite does not support; they may be false.
+
+        Args:
+            owner: description of the object that the options belong to, for the message.
+            keys: keys of the options.
+
+        Raises:
+            DocumentError: one of the options is true.
+        """
+        self.refuse_parts(owner, (key for key in keys if self.flag(key, False)))
 
     def refuse_unread_parts(self, node_description: str, more_keys: tuple[str, ...] = ()) -> None:
         """Refuse parts whose keys the program has not read, so that no setting is ignored silently.

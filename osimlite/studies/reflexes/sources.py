@@ -207,10 +207,7 @@ def _read_axis(sensed_model: SensedModel, node: SettingNode, number: int, side: 
     On the left side x and y change sign, so that one setting serves both sides: a mirror image in
     the sagittal plane reverses rotations about x and y and keeps those about z.
     """
-    if node.flag("use_rotation_vector", False):
-        raise node.error(
-            "osimlite does not support 'use_rotation_vector' of reflexes; leave it out"
-        )
+    node.refuse_flags("reflexes", ("use_rotation_vector",))
     axis = node.vector("axis", "0 0 1")
     if not axis.any():
         raise node.error("'axis' is 0 0 0; set an axis other than zero")
