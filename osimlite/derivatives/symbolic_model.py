@@ -35,7 +35,7 @@ class SymbolicModel(DifferentiableModel):
     :class:`osimlite.derivatives.differentiable_model.DifferentiableModel`, and:
 
     Args:
-        loads_given: whether t also contains the values of the time-dependent loads at that time
+        loads_as_inputs: whether t also contains the values of the time-dependent loads at that time
             (`loads`; none for a model with parameters): tables of thousands of rows make large
             formulas.
     """

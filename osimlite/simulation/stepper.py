@@ -54,7 +54,7 @@ class Stepper(ABC):
     Attributes:
         time: present time, s.
         state: state y at this time; every step makes a new list.
-        derivative: function f(time, state) that returns the derivative of the state.
+        derivative: derivative f(time, state) of this state.
         evaluations: number of calls of f so far.
         accepted: number of accepted steps so far.
         ended: exception that ended a table before its last time: Ctrl-C, or an error of the motion.

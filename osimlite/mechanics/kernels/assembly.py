@@ -313,7 +313,7 @@ def restore_pose(a: Assembly, q: Floats, is_assembled: bool) -> bool:
         solve_minimum_norm(count, free, factor, rank, values, work, step)
         furthest = LONGEST_STEP
         for k in range(free):
-            # The unknown of an eased coordinate is its change over EASE.
+            # The unknown of an eased coordinate is its change over UNCOUNTED_MOBILITY.
             if not is_assembled and is_counted[free_list[k]] == 0:
                 step[k] *= UNCOUNTED_MOBILITY
             furthest = max(furthest, abs(step[k]))

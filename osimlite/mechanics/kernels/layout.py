@@ -139,7 +139,7 @@ class OPERATION(metaclass=Record):
         MOTION: type of the motion, see `MOTION`.
         BEFORE: type of the fixed transform before the motion, see `TRANSFORM`.
         DOF: degree of freedom that is the amount of the motion, or -1.
-        FUNCTION: number of the law that gives the amount or the motion of a ball; or SINGLE, TOGETHER.
+        FUNCTION: number of the law that gives the amount or the motion of a ball; or SINGLE, SUMMED.
         ARGUMENTS, ARGUMENT_COUNT: offset in the model and number of the arguments of that law, which
             are degrees of freedom or -1 for a constant one.
         EXTRA: offset in reals of the radii, or of constant arguments and then the function's table.

@@ -109,9 +109,8 @@ class Motion(NamedTuple):
 
     model: Ints  # integers of the mechanism
     reals: Floats  # numbers of the mechanism
-    data: (
-        Floats  # results and workspace; the record of the integration method at RUN_SIZES.METHOD_AT
-    )
+    # results and workspace; the record of the integration method at RUN_SIZES.METHOD_AT
+    data: Floats
     sizes: Ints  # sizes and settings, see `RUN_SIZES`
     clock: Floats  # time and next step to try, s; changed
     counts: Ints  # counts of the run, see `COUNTS`; changed

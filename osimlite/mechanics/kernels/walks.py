@@ -110,7 +110,7 @@ def hold_several(
         peaks: largest force of each contact (N) and its time (s), for each copy (copies, P, 2);
             changed.
         control_offsets: offsets in reals of the controls.
-        controls: controls of each copy (copies, held_by).
+        controls: controls of each copy (copies, control_count).
         control_count: number of controls.
         running: filled with 1 for a copy that reaches the end of the step, else 0.
         first: number of the first copy.

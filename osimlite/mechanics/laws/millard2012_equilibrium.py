@@ -85,9 +85,8 @@ class MillardFibers(NamedTuple):
     A field for the value of a curve has the argument of the curve until it is evaluated.
     """
 
-    velocity_source: (
-        float  # condition that determines the velocity: NONE, DAMPED, INVERSE, RIGID or SLACK
-    )
+    # condition that determines the velocity: NONE, DAMPED, INVERSE, RIGID or SLACK
+    velocity_source: float
     velocity: float  # normalized fiber velocity, or the value that determines it
     by_velocity: float  # factor of the active force by velocity
     active: float  # activation

@@ -58,10 +58,10 @@ def build_mechanism(
         opensim_derivatives: whether to reproduce two wrong second derivatives of OpenSim 4.6.
             First, Simbody differentiates the angular velocity of a CustomJoint as if the first
             rotation depended on the first coordinate only, and the second rotation on the first two
-            coordinates only. Accelerations are therefore wrong where one coordinate drives several rotations (for the knee of
-            Rajagopal's model by up to 1 % at usual speeds), and energy is not conserved. Second,
-            OpenSim uses the gradient of a MultivariatePolynomialFunction for each column of its
-            Hessian. Without this option both are correct.
+            coordinates only. Accelerations are therefore wrong where one coordinate drives several
+            rotations (for the knee of Rajagopal's model by up to 1 % at usual speeds), and energy is
+            not conserved. Second, OpenSim uses the gradient of a MultivariatePolynomialFunction for
+            each column of its Hessian. Without this option both are correct.
         rolling: whether every RollingOnSurfaceConstraint acts. OpenSim leaves them off until a
             program enables them.
 

@@ -200,7 +200,7 @@ class PairContact:
         """
         stations = [link_map.station(surface.body, surface.center) for surface in self.surfaces]
         links = (link for link, _ in stations)
-        pairs = (station for pair in self.pairs for station in (pair.first, pair.second))
+        pairs = (index for pair in self.pairs for index in (pair.first, pair.second))
         numbers = (
             x
             for (_, center), surface in zip(stations, self.surfaces, strict=True)

@@ -34,7 +34,7 @@ class StabilityOptimization:
 
     Args:
         search: search that computes the cycle of a model.
-        found: cycle to start from.
+        model_cycle: numbers of the model with the gait cycle to start from.
         digits: significant digits of the numbers that will be written.
 
     Attributes:

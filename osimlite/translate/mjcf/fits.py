@@ -117,7 +117,7 @@ def _is_adjustable(part: TendonSite | WrapGeom) -> bool:
 
 
 def _move_adjustable_parts(piece: Tendon, x: Array) -> Tendon:
-    """Return the piece with its free parts changed by the variables of the search."""
+    """Return the piece with its adjustable parts changed by the variables of the search."""
     parts: list[TendonSite | WrapGeom] = []
     for part in piece:
         if not _is_adjustable(part):

@@ -91,8 +91,8 @@ def fit_quartics(data: bytes) -> tuple[Array, Array]:
     values = np.frombuffer(data).reshape(SAMPLE_COUNT, -1)
     monomials = np.vander(UNIT_POINTS, DEGREE + 1, increasing=True)
 
-    # The inner quartic is scaled to [-1, 1], so that its bends are its only free numbers.
-    # The inner quartic must reach -1 and 1, so that the outer one uses its complete range.
+    # The inner quartic is scaled so that it reaches -1 and 1, and the outer one uses its complete
+    # range. This determines its coefficients of order 0 and 1; the others are the variables.
     def make_inner(variables: Array) -> Array:
         coefficients = np.array((0.0, 1.0, *variables))
         reached = monomials @ coefficients
@@ -102,7 +102,8 @@ def fit_quartics(data: bytes) -> tuple[Array, Array]:
         return coefficients / half
 
     def fit_outer(variables: Array) -> tuple[Array, Array]:
-        # For given bends the outer quartics follow by linear least squares (variable projection).
+        # For a given inner quartic the outer ones follow by linear least squares (variable
+        # projection).
         basis = np.polynomial.chebyshev.chebvander(monomials @ make_inner(variables), DEGREE)
         result: Array = np.asarray(np.linalg.lstsq(basis, values, rcond=None)[0], dtype=np.float64)
         return result, (basis @ result - values).ravel()
