@@ -29,13 +29,13 @@ if TYPE_CHECKING:
     from osimlite.studies.sweep.optimize import Optimum
     from osimlite.studies.sweep.run import Outcome
 
-MOST_ROWS = 200
+MAX_ROWS = 200
 """Largest number of rows of a table."""
 
-MOST_COMPONENTS = 3000
+MAX_COMPONENTS = 3000
 """Largest number of components of a tree."""
 
-MOST_BYTES = 12_000_000
+MAX_BYTES = 12_000_000
 """Largest size of an embedded page, compressed and in base64."""
 
 FIRST_ROWS = 10
@@ -60,7 +60,7 @@ def model(shown_model: Model) -> str:
     components = [component for component in tree.components if not tree.is_internal(component)]
     children: dict[int, list[Component]] = {}
     # The first component is the model itself.
-    for component in components[1:MOST_COMPONENTS]:
+    for component in components[1:MAX_COMPONENTS]:
         children.setdefault(id(tree.parent_of(component)), []).append(component)
 
     def branch(component: Component) -> str:
@@ -73,7 +73,7 @@ def model(shown_model: Model) -> str:
 
     summary = f"<b>{escape(shown_model.name) or 'a model'}</b>: {format_count(len(components), 'component')}"
     inner_html = "".join(map(branch, children.get(id(shown_model), [])))
-    hidden = _describe_hidden_rows(len(components), MOST_COMPONENTS)
+    hidden = _describe_hidden_rows(len(components), MAX_COMPONENTS)
     html = f"<details><summary>{summary}</summary>{inner_html}{hidden}</details>"
     return html + _embed_viewer(shown_model)
 
@@ -191,7 +191,7 @@ def _embed_viewer(shown_model: Model, motion: Trajectory | None = None) -> str:
     except OsimliteError as error:
         return f"<div>no picture: {escape(error.message)}</div>"
     # Notebooks with larger outputs become slow to open.
-    if len(encoded) > MOST_BYTES:
+    if len(encoded) > MAX_BYTES:
         return (
             f"<div>a page of {len(encoded) / 1e6:.0f} MB is too large for a notebook; write it to a file: "
             "<code>osimlite.view.ModelView.from_model(model, motion=trajectory).write_page('page.html')</code></div>"
@@ -205,7 +205,7 @@ def _embed_viewer(shown_model: Model, motion: Trajectory | None = None) -> str:
 
 
 def _make_table(
-    headings: Sequence[str], rows: Iterable[Sequence[str]], count: int, max_rows: int = MOST_ROWS
+    headings: Sequence[str], rows: Iterable[Sequence[str]], count: int, max_rows: int = MAX_ROWS
 ) -> str:
     """Return an HTML table of the first `max_rows` rows, followed by the number of omitted ones."""
 

@@ -29,12 +29,12 @@ Line = TypeVar("Line")
 LINES_IN_PANEL = 7
 """Number of lines in a panel: more cannot be told apart."""
 
-MOST_ENERGIES = 400
+MAX_ENERGY_TIMES = 400
 """Largest number of times at which energies are computed; more would not be visible."""
 
 STORED = "stored in contacts, springs, muscles"
 
-_NEVER_MIND = 1e-9
+_CONTACT_THRESHOLD = 1e-9
 """Force, relative to the largest one, below which there is no contact."""
 
 
@@ -78,7 +78,7 @@ def compute_energies(
     """Compute the energies of a motion; potential energy is zero at the origin of ground.
 
     Only a simulated trajectory has the energy that contacts and springs store. Other motions are
-    evaluated at `MOST_ENERGIES` times at most.
+    evaluated at `MAX_ENERGY_TIMES` times at most.
 
     Returns:
         Times (m,), s, and the energies (m,), J, by name.
@@ -90,7 +90,9 @@ def compute_energies(
         kinetic, height = np.asarray(recorded["kinetic"]), np.asarray(recorded["gravity"])
         energies = {"kinetic": kinetic, "potential of gravity": height}
         return times, {**energies, STORED: np.asarray(recorded["stored"])}
-    indices = np.unique(np.linspace(0, len(times) - 1, min(len(times), MOST_ENERGIES)).astype(int))
+    indices = np.unique(
+        np.linspace(0, len(times) - 1, min(len(times), MAX_ENERGY_TIMES)).astype(int)
+    )
     q = order_columns(motion, mechanism, np.asarray(motion.values)[indices])
     u = order_columns(motion, mechanism, np.asarray(motion.speeds)[indices])
     kinetic = np.array([mechanism.kinetic_energy(*state) for state in zip(q, u, strict=True)])
@@ -166,7 +168,7 @@ def _plot_contacts(times: Array, forces: Sequence[ContactForce]) -> Any:
         for force in forces
     }
     # Sizes below the threshold are noise of contacts that do not touch.
-    threshold = _NEVER_MIND * max(float(size.max()) for size in sizes.values())
+    threshold = _CONTACT_THRESHOLD * max(float(size.max()) for size in sizes.values())
     active_sizes = {label: size for label, size in sizes.items() if size.max() > threshold}
     figure, (force_panel, contact_panel) = make_sheet(
         "Contact forces", [3.4, 0.5 + 0.25 * max(1, len(active_sizes))]

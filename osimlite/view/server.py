@@ -19,7 +19,7 @@ _log = logging.getLogger(__name__)
 
 # Not reachable from other machines: the page shows models that may not be public.
 HOST = "127.0.0.1"
-_LONGEST = 1_000_000
+_MAX_REQUEST_BYTES = 1_000_000
 IDLE_TIMEOUT_S = 30.0
 """Time without data from the browser after which a connection is closed (s)."""
 
@@ -82,10 +82,10 @@ class _QuietServer(ThreadingHTTPServer):
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """Log at debug level only: a browser may close its connection at any time."""
-        _log.debug("a question was not answered", exc_info=True)
+        _log.debug("a request was not answered", exc_info=True)
 
 
-class _BadQuestion(Exception):
+class _BadRequest(Exception):
     """Request that cannot be answered, with its HTTP status."""
 
     def __init__(self, status: HTTPStatus, reason: str) -> None:
@@ -111,25 +111,24 @@ def _make_handler(
         def do_POST(self) -> None:
             try:
                 status = HTTPStatus.OK
-                result = assemble_pose(mechanism, self._question())
-            except _BadQuestion as problem:
+                result = assemble_pose(mechanism, self._read_request())
+            except _BadRequest as problem:
                 status = problem.status
                 result = {"error": str(problem)}
                 # The rest of a refused request is not the next request.
                 self.close_connection = True
             self._respond(status, json.dumps(result).encode(), "application/json")
 
-        def _question(self) -> bytes:
+        def _read_request(self) -> bytes:
+            """Return the body of a request for a pose."""
             if not self._is_for_us() or self.path != "/assemble":
-                raise _BadQuestion(HTTPStatus.FORBIDDEN, "this server answers its own page only")
+                raise _BadRequest(HTTPStatus.FORBIDDEN, "this server answers its own page only")
             length = self.headers.get("Content-Length", "")
             # `int` would also accept signs, underscores and digits of other scripts.
             if not (length.isascii() and length.isdigit() and len(length) < 20):
-                raise _BadQuestion(
-                    HTTPStatus.BAD_REQUEST, "the question does not say how long it is"
-                )
-            if int(length) > _LONGEST:
-                raise _BadQuestion(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, "the question is too long")
+                raise _BadRequest(HTTPStatus.BAD_REQUEST, "the request has no valid Content-Length")
+            if int(length) > _MAX_REQUEST_BYTES:
+                raise _BadRequest(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, "the request is too long")
             return self.rfile.read(int(length))
 
         def _is_for_us(self) -> bool:
@@ -152,31 +151,31 @@ def _make_handler(
     return Handler
 
 
-def assemble_pose(mechanism: Mechanism, question: bytes) -> dict[str, Any]:
+def assemble_pose(mechanism: Mechanism, request: bytes) -> dict[str, Any]:
     """Compute the pose nearest to the values of a request that fulfils the constraints.
 
     Args:
         mechanism: mechanism of the model.
-        question: JSON text of the request, with one value per coordinate (rad, m).
+        request: JSON text of the request, with one value per coordinate (rad, m).
 
     Returns:
         `values` of the coordinates, or `error` with a message.
 
     Raises:
-        _BadQuestion: the request is not a list of one number per coordinate.
+        _BadRequest: the request is not a list of one number per coordinate.
     """
     try:
-        match json.loads(question):
+        match json.loads(request):
             case {"values": [*values]} if all(isinstance(value, int | float) for value in values):
                 q = np.array(values, dtype=float)
             case _:
                 raise ValueError
     except (ValueError, OverflowError, RecursionError):
-        raise _BadQuestion(
+        raise _BadRequest(
             HTTPStatus.BAD_REQUEST, "expected a list of values in the request"
         ) from None
     if len(q) != len(mechanism.coordinates):
-        raise _BadQuestion(
+        raise _BadRequest(
             HTTPStatus.BAD_REQUEST, f"the model has {len(mechanism.coordinates)} coordinates"
         )
     if not np.isfinite(q).all():

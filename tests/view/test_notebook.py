@@ -54,7 +54,7 @@ def test_a_model_with_a_wrong_reference_is_shown_without_that_part(fixtures: Pat
 
 
 def test_a_page_too_large_is_left_out(monkeypatch):
-    monkeypatch.setattr(notebook, "MOST_BYTES", 1000)
+    monkeypatch.setattr(notebook, "MAX_BYTES", 1000)
     html = dynamic_walker()._repr_html_()
     assert "too large" in html and len(html) < 30_000
 
@@ -77,7 +77,7 @@ def test_findings_are_a_table_the_worst_first():
     assert html.index("OSIM101") < html.index("OSIM508")
     assert "1 error, 0 warnings, 1 remark" in html and "f:3" in html and "a &lt; b" in html
     many = Report(result * 200)._repr_html_()
-    assert "and 200 more" in many and many.count("<tr>") == notebook.MOST_ROWS + 1
+    assert "and 200 more" in many and many.count("<tr>") == notebook.MAX_ROWS + 1
 
 
 def test_findings_and_trees_need_no_arrays():

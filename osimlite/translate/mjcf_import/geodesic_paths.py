@@ -40,7 +40,7 @@ from osimlite.translate.mjcf_import.tendon_lengths import (
 
 CLOSE_M = 1e-6
 """Largest error of a path over contact surfaces, and error of wrap objects above which one is tried."""
-LEAST_CLEARANCE_M = 1e-4
+MIN_CLEARANCE_M = 1e-4
 """Least distance of a path point from an obstacle: OpenSim refuses points inside of one."""
 
 Hints = tuple[Array | None, ...]
@@ -118,7 +118,7 @@ def find_hint(
     axis_mask = np.array((1.0, 1.0, 0.0 if is_cylinder(draft, segment.geom) else 1.0))
     if (
         min(np.linalg.norm(axis_mask * end) for end in (first_point, second_point))
-        < radius + LEAST_CLEARANCE_M
+        < radius + MIN_CLEARANCE_M
     ):
         return None
     side_site = None

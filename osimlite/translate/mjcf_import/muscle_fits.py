@@ -46,11 +46,11 @@ SEARCH_COUNT = 1
 """Number of the best starting points from which a fit is searched; a second one changes little."""
 CACHE_DIGITS = 6
 """Digits of the parameters that the cache of fitted curves distinguishes."""
-LEAST_FVMAX = 1.001
+MIN_FVMAX = 1.001
 """Least force of lengthening fibers that a ForceVelocityCurve can have: it must be above 1."""
 LENGTH_STEP = 0.05
 """Step of the largest length of a fit, so that similar muscles share a cached curve."""
-LEAST_LENGTH = 0.01
+MIN_LENGTH = 0.01
 """Least active fiber length of an ActiveForceLengthCurve."""
 
 
@@ -210,7 +210,7 @@ def _fit_active(lmin: float, lmax: float) -> dict[str, float]:
             "minimum_value": 0.0,
         }
 
-    lower_length = max(lmin, LEAST_LENGTH)
+    lower_length = max(lmin, MIN_LENGTH)
     # The bounds keep the properties in the order that the curve requires.
     longest = max(lmax, 1.06)
     return _search(
@@ -233,14 +233,14 @@ def _fit_active(lmin: float, lmax: float) -> dict[str, float]:
             for transition_fraction in (0.3, 0.45, 0.6, 0.75, 0.9)
             for slope in (0.1, 0.3, 0.5, 0.7)
         ),
-        (LEAST_LENGTH, 0.05, 1.06, 0.02),
+        (MIN_LENGTH, 0.05, 1.06, 0.02),
         (0.95, 0.95, max(1.5 * longest, 2.0), 0.95),
     )
 
 
 @lru_cache(maxsize=1024)
 def _fit_velocity(fvmax: float) -> dict[str, float]:
-    eccentric_force = max(fvmax, LEAST_FVMAX)
+    eccentric_force = max(fvmax, MIN_FVMAX)
     x = np.linspace(-1.05, 1.05, CURVE_POINTS)
     target = Shape(0.5, 1.6, eccentric_force).velocity(x)
     # The curve must be steeper at 0 than on average beyond.

@@ -13,15 +13,15 @@ from osimlite.translate.fidelity import Error
 from osimlite.translate.mjcf_import.draft import ConversionDraft, TendonPath
 from osimlite.translate.mjcf_import.muscle_fits import FittedCurves, Shape, fit_curves
 
-LEAST_SLACK_M = 1e-4
+MIN_SLACK_M = 1e-4
 """Least tendon slack length; OpenSim requires one above 0."""
-MOST_PASSIVE = 10.0
+MAX_PASSIVE = 10.0
 """Passive force at which a RigidTendonMuscle cuts its curve off, as a part of the isometric force."""
 DEFAULT_ACTIVATION = 0.01
 """Activation at the start. MuJoCo starts with 0, which OpenSim's muscle of De Groote does not accept."""
 LONGEST_QUANTILE = 0.95
 """Quantile of the lengths in sampled poses up to which the passive curve is fitted."""
-MOST_LENGTH = 4.0
+MAX_LENGTH = 4.0
 """Normalized length beyond which no passive curve is fitted."""
 SPEEDS = (-0.5, -0.25, 0.0, 0.25, 0.5)
 """Normalized velocities at which forces are compared."""
@@ -140,7 +140,7 @@ def make_muscle(
         and data.vmax > 0.0
         and data.shape.passive_width > 0.0
         and data.shape.lmin < 1.0 < data.shape.lmax
-        and data.fiber + data.slack > LEAST_SLACK_M
+        and data.fiber + data.slack > MIN_SLACK_M
     ):
         draft.drop(
             "actuator",
@@ -151,9 +151,9 @@ def make_muscle(
         return None
     detail = ""
     # The slack length moves into the fiber, which leaves the force as it is.
-    if data.slack < LEAST_SLACK_M:
+    if data.slack < MIN_SLACK_M:
         detail = f"; its tendon slack length of {data.slack:.4g} m is now part of the fiber"
-        data = data.replace_slack(LEAST_SLACK_M)
+        data = data.replace_slack(MIN_SLACK_M)
     name = draft.unique("force", draft.source.name_of("actuator", actuator))
     has_activation = int(model.actuator_dyntype[actuator]) == int(
         draft.source.mujoco.mjtDyn.mjDYN_MUSCLE
@@ -167,7 +167,7 @@ def make_muscle(
         return _make_exact(draft, actuator, name, path, data, has_activation, limits, detail)
     # Polynomial paths can have odd lengths in single poses, which must not decide.
     longest = float(np.quantile(lengths, LONGEST_QUANTILE) - data.slack) / data.fiber
-    curves = fit_curves(data.shape, min(longest, MOST_LENGTH))
+    curves = fit_curves(data.shape, min(longest, MAX_LENGTH))
     active, velocity, passive = curves.components()
     muscle = Millard2012EquilibriumMuscle(
         name=name,
@@ -272,11 +272,11 @@ def _make_exact(
         )
     else:
         draft.note_result("actuator", actuator, f"muscle {name}")
-    if data.shape.fpmax > MOST_PASSIVE:
+    if data.shape.fpmax > MAX_PASSIVE:
         draft.record(
             "actuator",
             actuator,
-            f"a passive force of more than {MOST_PASSIVE:g} times the isometric force",
+            f"a passive force of more than {MAX_PASSIVE:g} times the isometric force",
             "limited to this force",
         )
     return muscle

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.function_types import MultivariatePolynomialFunction
 
-MOST_TERMS = 330
+MAX_TERMS = 330
 """Largest number of terms: order 4 of seven coordinates, order 6 of four."""
-MOST_ORDER = 8
+MAX_ORDER = 8
 SAMPLES_PER_TERM = 4
 CLOSE_M = 1e-6
 """Error in poses that were not fitted (rms, m) at which the order is high enough."""
@@ -55,8 +55,8 @@ def possible_orders(count: int) -> list[int]:
     """Return the orders whose number of terms is not too large, for `count` coordinates."""
     return [
         order
-        for order in range(1, MOST_ORDER + 1)
-        if order == 1 or math.comb(count + order, order) <= MOST_TERMS
+        for order in range(1, MAX_ORDER + 1)
+        if order == 1 or math.comb(count + order, order) <= MAX_TERMS
     ]
 
 

@@ -60,14 +60,14 @@
     title() {
       $("h1").textContent = this.data.name || "a model";
       $("#facts").textContent = this.data.facts;
-      const kept = this.data.constraints;
-      if (kept.length && !this.data.server) {
+      const { constraints } = this.data;
+      if (constraints.length && !this.data.server) {
         $("#notice").hidden = false;
-        $("#notice").textContent = `Sliders on this page do not enforce ${kept.map((path) => path.split("/").pop()).join(", ")}; those of 'osimlite view' without --html do.`;
+        $("#notice").textContent = `Sliders on this page do not enforce ${constraints.map((path) => path.split("/").pop()).join(", ")}; those of 'osimlite view' without --html do.`;
       }
     }
 
-    // What is told of the motion, the pages beside this one, and the motion itself at once.
+    // Show the text about the motion and the links to the other pages, and play the motion.
     story({ words, command, page, pages }) {
       $("#story nav").append(...pages.map(([title, file]) => {
         const link = make("a", { textContent: title, href: file });
@@ -100,7 +100,7 @@
       if (this.data.server && this.data.constraints.length) this.assemble();
     }
 
-    // Ask the server for the nearest pose that fulfils the constraints, one question at a time.
+    // Ask the server for the nearest pose that fulfils the constraints, one request at a time.
     async assemble() {
       if (this.asking) { this.askAgain = true; return; }
       this.asking = true;
