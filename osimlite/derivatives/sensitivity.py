@@ -355,8 +355,7 @@ class _SensitivityRun:
             ]
             raise SettingError(
                 f"at {t:g} s the derivative of '{worst_state}' differs between tangents and motion; create "
-                "the tangents from this "
-                "model"
+                "the tangents from this model"
             )
 
 

@@ -203,8 +203,7 @@ class Simulation:
         if fixed_step is None and options.accuracy > LOOSEST_SOUND_ACCURACY:
             warn_caller(
                 f"an accuracy of {options.accuracy:g} is so loose that the computed motion may differ greatly "
-                "from the exact one; "
-                f"use {LOOSEST_SOUND_ACCURACY:g} or less"
+                f"from the exact one; use {LOOSEST_SOUND_ACCURACY:g} or less"
             )
         if options.show and fixed_step is None:
             raise SettingError("showing the motion needs a fixed step, for instance 0.001 s")

@@ -114,8 +114,7 @@ def add_controls(
     if begin > start + PRINTED_TIME_TOLERANCE_S or end < to - PRINTED_TIME_TOLERANCE_S:
         warn_caller(
             f"the {description} cover only {max(begin, start):g} to {min(end, to):g} s of the motion, which "
-            f"goes from {start:g} to "
-            f"{to:g} s; outside, the first and last values are used"
+            f"goes from {start:g} to {to:g} s; outside, the first and last values are used"
         )
     return controls.add_functions(functions)
 

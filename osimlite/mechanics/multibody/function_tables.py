@@ -23,10 +23,10 @@ def function_table(function: f.SmoothFunction, description: str) -> list[float]:
     Raises:
         UnsupportedError: the kernels cannot evaluate it.
     """
-    return _has_table(f.table_at_knots(function), function, description)
+    return _require_table(f.table_at_knots(function), function, description)
 
 
-def _has_table(table: list[float], function: f.SmoothFunction, description: str) -> list[float]:
+def _require_table(table: list[float], function: f.SmoothFunction, description: str) -> list[float]:
     """Return a table, or raise UnsupportedError if it is empty.
 
     Args:
@@ -82,4 +82,4 @@ def _table_of_one(function: f.SmoothFunction, description: str) -> list[float]:
             FUNCTION_TYPE.PIECES_OF_OPENSIM if function.opensim_derivatives else function_type,
             *remainder,
         ]
-    return _has_table([*function.table], function, description)
+    return _require_table([*function.table], function, description)

@@ -148,8 +148,8 @@ class Placements:
             target = self.tree.target(frame, socket, getattr(frame, socket))
             if not isinstance(target, Station):
                 raise ModelError(
-                    f"the frame '{self.path(frame)}': {socket} names '{self.path(target)}', {add_article(type(target).__name__)}"
-                    "; name a Station"
+                    f"the frame '{self.path(frame)}': {socket} names '{self.path(target)}', "
+                    f"{add_article(type(target).__name__)}; name a Station"
                 )
             stations.append(target)
         return stations

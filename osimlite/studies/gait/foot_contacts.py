@@ -124,8 +124,7 @@ def _find_feet(mechanism: Mechanism, soles: Sequence[_SoleContact]) -> tuple[tup
         names = join_words(mechanism.bodies[end].name for end in end_bodies)
         raise OsimliteError(
             f"'{mechanism.name}' touches the ground with the ends of {format_count(len(end_bodies), 'leg')} "
-            f"({names}), but a walk "
-            "needs two feet; name their contact forces with --foot"
+            f"({names}), but a walk needs two feet; name their contact forces with --foot"
         )
     result = []
     for end in end_bodies:

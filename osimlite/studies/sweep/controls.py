@@ -178,8 +178,7 @@ def check_nodes(controls: Mapping[int, Control], interpolation: str, to: float) 
         if len(times) < MIN_CUBIC_NODES or times[0] > 0.0 or times[-1] < to * (1.0 - 1e-9):
             raise SettingError(
                 f"cubic interpolation needs at least {MIN_CUBIC_NODES} nodes, the first at 0 s and the last "
-                "at the end of the runs, "
-                f"{to:g} s; the nodes of '{actuator}' are at {', '.join(f'{time:g}' for time in times)} s"
+                f"at the end of the runs, {to:g} s; the nodes of '{actuator}' are at {', '.join(f'{time:g}' for time in times)} s"
             )
 
 

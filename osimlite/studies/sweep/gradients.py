@@ -189,8 +189,7 @@ class Gradients:
             ].name
             raise SimulationError(
                 f"'{self._measure.name}' has no derivative with respect to '{variable_name}'; it may depend "
-                "on more than the states. Choose "
-                "another measure, or another --method"
+                "on more than the states. Choose another measure, or another --method"
             )
         return result
 

@@ -159,8 +159,7 @@ def refuse_other_settings(
     if differences := describe_differences(old_settings, settings):
         raise SettingError(
             f"'{path}' has results that were computed with other settings: {join_words(differences)}; name "
-            "another output with -o, or replace "
-            "the results with --force"
+            "another output with -o, or replace the results with --force"
         )
 
 

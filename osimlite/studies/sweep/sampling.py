@@ -125,8 +125,7 @@ def choose_samples(
     if sampler is None and count is not None and with_values:
         raise SettingError(
             "--samples sets the number of runs of a random sampler, and the COUNT in the range of "
-            f"{join_words(with_values)} the size "
-            "of a grid; leave out one of the two, or select a --sampler"
+            f"{join_words(with_values)} the size of a grid; leave out one of the two, or select a --sampler"
         )
     if sampler is None:
         sampler = (

@@ -137,8 +137,7 @@ def _add_inertia(
             "an inertia that no body can have (one principal moment exceeds the sum of the others): MuJoCo stops with "
             "'inertia must satisfy A + B >= C'",
             "the smallest moment is raised until the inertia is possible (MuJoCo's option balanceinertia "
-            "would set all three to their "
-            "mean); for the original inertia, set body_inertia of the compiled model",
+            "would set all three to their mean); for the original inertia, set body_inertia of the compiled model",
             "moments " + ", ".join(f"{moment:g}" for moment in moments) + " kg m^2",
             {"moment": Error.measure(_repair_moments(moments) - moments, "kg m^2")},
         )
