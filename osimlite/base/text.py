@@ -246,7 +246,7 @@ def add_article(noun: str) -> str:
     return f"{'an' if noun.lstrip('<').startswith(_VOWELS) else 'a'} {noun}"
 
 
-_VOWELS = (*"AEIOaeio", "RRA", "Um")
+_VOWELS = (*"AEIOaeio", "RRA", "Um", "ndarray")
 """Beginnings of words with the article "an"; a UniversalJoint needs "a"."""
 
 

@@ -93,7 +93,7 @@ def ik(
         # Markers that are not seen in a frame have no error there.
         has_missing=True,
     )
-    for line in describe_fit(motion):
+    for _, line in describe_fit(motion):
         say(line)
     if unknown_text := describe_unknown(model, NO_EFFECT):
         say(unknown_text, err=True)

@@ -116,7 +116,7 @@ def scale(
         say(f"left out: {note}")
     say(f"mass: {result.describe_mass()}")
     if result.placed is not None:
-        for line in result.placed.describe_pose():
+        for _, line in result.placed.describe_pose():
             say(line)
     if result.unknown:
         say(result.unknown, err=True)

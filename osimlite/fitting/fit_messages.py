@@ -16,8 +16,6 @@ MAX_NAMED_COORDINATES = 8
 """Number of undetermined coordinates that a message names."""
 RECOMMENDS = "OpenSim recommends"
 """Begins the note of a message about marker errors beyond the recommended limits."""
-UNDETERMINED = "no measurement determines"
-"""Begins the message about coordinates that no measurement determines."""
 NO_EFFECT = "Such parts have no effect on the fit"
 """Consequence for parts of unknown classes where a motion is fitted to markers."""
 MAX_NAMED_PARTS = 3
@@ -26,7 +24,7 @@ MAX_NAMED_PARTS = 3
 
 def describe_fit(
     motion: FittedMotion, advice: tuple[float, float] = MARKER_ERROR_LIMITS_M, marker_note: str = ""
-) -> Iterator[str]:
+) -> Iterator[tuple[str, str]]:
     """Yield messages about a fitted motion.
 
     Args:
@@ -34,8 +32,12 @@ def describe_fit(
         advice: limits of the root mean square and of the largest marker error that OpenSim's
             documentation recommends, m.
         marker_note: text that says for which markers the limits hold.
+
+    Yields:
+        Subject of the message (markers, sensors or coordinates), and its text.
     """
     result = motion.summary
+    measured = "markers" if motion.markers else "sensors"
     if "rms_marker_error" in result:
         rms = result["rms_marker_error"]
         largest = result["largest_marker_error"]
@@ -50,10 +52,11 @@ def describe_fit(
         # Errors of metres are typical of millimetres that are read as metres.
         advice_text += "; check the units of the data" if rms > IMPLAUSIBLE_ERROR_M else ""
         yield (
+            "markers",
             f"{format_count(result['frames'], 'frame')}, "
             f"{format_count(result['markers'], 'marker')}: errors of {100.0 * rms:.2f} cm (root "
             f"mean square), at most {100.0 * largest:.2f} cm ({result['worst_marker']} at "
-            f"{result['worst_time']:g} s){advice_text}"
+            f"{result['worst_time']:g} s){advice_text}",
         )
     if "rms_orientation_error" in result:
         rms, largest = (
@@ -61,28 +64,35 @@ def describe_fit(
             for statistic in ("rms", "largest")
         )
         yield (
+            "sensors",
             f"{result['frames']} frames, {result['sensors']} sensors: errors of {rms:.2f} degrees "
-            "(root mean square), "
-            f"at most {largest:.2f} degrees ({result['worst_sensor']} at "
-            f"{result['worst_sensor_time']:g} s)"
+            f"(root mean square), at most {largest:.2f} degrees ({result['worst_sensor']} at "
+            f"{result['worst_sensor_time']:g} s)",
         )
     if result["partly_unseen"]:
         unseen_shares = [
             f"{name} ({100.0 * unseen_fraction:.3g} %)"
             for name, unseen_fraction in result["partly_unseen"].items()
         ]
-        yield f"share of the frames without a measurement: {join_words(unseen_shares)}"
+        yield measured, f"share of the frames without a measurement: {join_words(unseen_shares)}"
     if result["frames_unseen"]:
         frames = format_count(result["frames_unseen"], "frame")
-        yield f"{frames} without a measurement of positive weight: these frames get the pose of the frame before"
+        yield (
+            measured,
+            f"{frames} without a measurement of positive weight: these frames get the pose of the "
+            "frame before",
+        )
     if motion.undetermined:
         yield (
-            f"{UNDETERMINED} {join_words(motion.undetermined, max_count=MAX_NAMED_COORDINATES)}, "
-            "which stay near the default pose; OpenSim may find other values, such as the middle "
-            "of their ranges. Lock them, or add tasks for them"
+            "coordinates",
+            "no measurement determines "
+            f"{join_words(motion.undetermined, max_count=MAX_NAMED_COORDINATES)}, which stay near "
+            "the default pose; OpenSim may find other values, such as the middle of their ranges. "
+            "Lock them, or add tasks for them",
         )
     if result["frames_unsettled"]:
-        yield f"the solver did not converge in {format_count(result['frames_unsettled'], 'frame')}"
+        frames = format_count(result["frames_unsettled"], "frame")
+        yield measured, f"the solver did not converge in {frames}"
 
 
 def find_unknown(model: Model) -> list[str]:

@@ -34,8 +34,12 @@ class MarkerPlacement:
     removed: tuple[str, ...]  # removed markers, which the data lack
     moved: dict[str, float]  # distance by which each marker moved, m
 
-    def describe_pose(self) -> Iterator[str]:
-        """Yield messages about the pose, with OpenSim's limits for a static trial."""
+    def describe_pose(self) -> Iterator[tuple[str, str]]:
+        """Yield messages about the pose, with OpenSim's limits for a static trial.
+
+        Yields:
+            Subject and text of each message, see :func:`describe_fit`.
+        """
         return describe_fit(self.pose, (0.01, 0.02), " for markers on bones")
 
 

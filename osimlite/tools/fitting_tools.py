@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,12 +10,7 @@ import numpy as np
 
 from osimlite.base.records import replace
 from osimlite.base.text import join_words
-from osimlite.fitting.fit_messages import (
-    NO_EFFECT,
-    UNDETERMINED,
-    describe_fit,
-    describe_unknown,
-)
+from osimlite.fitting.fit_messages import NO_EFFECT, describe_fit, describe_unknown
 from osimlite.fitting.ik_tool import create_motion_table, run_inverse_kinematics
 from osimlite.fitting.inverse_kinematics import inverse_kinematics
 from osimlite.fitting.marker_data import MarkerData
@@ -88,7 +82,8 @@ def run_inverse_kinematics_tool(job: Job, outcome: Outcome) -> None:
     if message := describe_unknown(model, NO_EFFECT):
         outcome.add_warning("unknown classes", message)
     outcome.summary |= motion.summary
-    _add_fit_messages(outcome, "markers", describe_fit(motion))
+    for subject, message in describe_fit(motion):
+        outcome.add_message(subject, message)
     requested = [
         task.name for task in setup.ik_task_set.objects if task.apply and is_a(task, "IKMarkerTask")
     ]
@@ -107,12 +102,6 @@ def run_inverse_kinematics_tool(job: Job, outcome: Outcome) -> None:
         if names:
             outcome.summary[key] = names
             outcome.add_message(category, join_words(names))
-
-
-def _add_fit_messages(outcome: Outcome, noun: str, messages: Iterable[str]) -> None:
-    """Add messages about a fit, with the name of what each is about."""
-    for message in messages:
-        outcome.add_message("coordinates" if message.startswith(UNDETERMINED) else noun, message)
 
 
 def run_scale_tool(job: Job, outcome: Outcome) -> None:
@@ -136,7 +125,8 @@ def run_scale_tool(job: Job, outcome: Outcome) -> None:
         outcome.add_message("mass", result.describe_mass())
     if result.placed is not None:
         outcome.summary |= result.placed.pose.summary
-        _add_fit_messages(outcome, "markers", result.placed.describe_pose())
+        for subject, message in result.placed.describe_pose():
+            outcome.add_message(subject, message)
 
 
 def run_imu_placer(job: Job, outcome: Outcome) -> None:
@@ -245,7 +235,8 @@ def run_imu_inverse_kinematics_tool(job: Job, outcome: Outcome) -> None:
         angles=motion.orientation_errors,
     )
     outcome.summary |= motion.summary
-    _add_fit_messages(outcome, "sensors", describe_fit(motion))
+    for subject, message in describe_fit(motion):
+        outcome.add_message(subject, message)
     if ignored_names := [name for name in data.names if name not in frames]:
         outcome.add_message(
             "left out", f"{join_words(ignored_names)}: the model has no frames with these names"

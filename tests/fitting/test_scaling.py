@@ -86,7 +86,7 @@ def test_a_gait_model_is_scaled_as_opensim_scales_it(setup: Path) -> None:
         read_sto(setup / "their_subject01_static_output.mot"),
     )
     assert pose.columns == known.columns and pose.rows == pytest.approx(known.rows, abs=0.02)
-    assert next(iter(result.placed.describe_pose())).endswith(
+    assert next(iter(result.placed.describe_pose()))[1].endswith(
         "OpenSim recommends less than 1 cm (root mean square) and 2 cm (largest) for markers on bones"
     )
     assert len(result.placed.moved) > 30 and max(result.placed.moved.values()) < 0.2

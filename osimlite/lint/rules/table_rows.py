@@ -107,8 +107,8 @@ def report_ragged_row(table: Table, report: FindingCollector) -> None:
             if table.is_markers or table.is_strict:
                 lost_count = rows.line_of(rows.count - 1) - fault.line
                 report(
-                    f"a blank line ends the table for OpenSim: {format_count(lost_count, 'row')} after it "
-                    "are lost",
+                    "a blank line ends the table: OpenSim ignores "
+                    f"{format_count(lost_count, 'row')} after it",
                     at=position,
                     fix=_remove_blank_lines(table, fault.line),
                 )
