@@ -20,7 +20,7 @@ class OsimliteError(Exception):
     """
 
     exit_code: ClassVar[int] = 2
-    """What the command line exits with: 1 if the answer is no, 2 if the command could not be carried out."""
+    """Exit code of commands: 1 if the answer is no, 2 if the command could not be carried out."""
 
     def __init__(
         self,

@@ -24,7 +24,7 @@ class Set(Object, abstract=True):
     """Objects of one kind, each with its own name."""
 
     objects: LegacyMany[Member] = make_empty_list()
-    """The members."""
+    """Members of the set, in order."""
     groups: LegacyMany[ObjectGroup] = make_empty_list()
     """Named selections of the members; the mechanics ignore them, and so do the tools."""
 

@@ -48,7 +48,7 @@ class Note(NamedTuple):
         spec: property that the element sets, if any.
         value: value that was read instead; None if the default stays.
         line: line of the element, if it is known.
-        why: reason why a named file was not read, as "which is not there".
+        why: reason why a named file was not read, as the end of a sentence such as "does not exist".
     """
 
     kind: NoteKind

@@ -25,8 +25,8 @@ ReadObject = TypeVar("ReadObject", bound=Object)
 IncludeReader = Callable[[str, type[Object]], tuple[Object, Include, list[Note]] | str]
 """Function that reads the object of a class from a file.
 
-It returns the object, the include and notes, or the reason why the file is not read, such as
-"which is not there".
+It returns the object, the include and notes, or the reason why the file is not read, as the end of a
+sentence such as "does not exist".
 """
 
 DEFAULTS = "defaults"

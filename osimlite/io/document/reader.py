@@ -456,16 +456,16 @@ def _make_include_reader(
                 root = _upgrade_tree(included, root, version).root
             top = next((child for child in root if is_element(child)), None)
             if top is None or top.tag != cls.tag:
-                return "holds none"
+                return f"contains no {cls.tag}"
             reader = ObjectReader(_make_include_reader(included, (*around, path), total))
             reader.count = 1
             included_object = reader.read_top(top, cls)
         except SpecialFileError as fault:
             return f"is not read: {fault.message.partition(': ')[2]}"
         except MissingFileError:
-            return "is not there"
+            return "does not exist"
         except DocumentError:
-            return "holds none"
+            return "is not a document of OpenSim"
         except RecursionError:
             return _TOO_DEEP_MESSAGE
         return included_object, Include(file, path, included_object.copy_deep()), reader.notes

@@ -133,7 +133,7 @@ class MocoDirectCollocationSolver(MocoSolver, abstract=True):
     multibody_dynamics_mode: Annotated[str, word("explicit", "implicit")] = "explicit"
     """Whether accelerations are computed, or are variables."""
     optim_solver: Annotated[str, word("ipopt", "snopt")] = "ipopt"
-    """The optimizer."""
+    """Optimizer of the nonlinear program."""
     optim_max_iterations: Annotated[int, Value("int", domain=">= 0 or -1")] = -1
     """Largest number of iterations of the optimizer; -1 for its own default."""
     optim_convergence_tolerance: Annotated[float, real(domain="> 0 or -1")] = -1.0

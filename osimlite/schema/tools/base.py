@@ -36,7 +36,7 @@ class AnalysisSet(Set):
     """The analyses of a run."""
 
     objects: LegacyMany[Analysis] = make_empty_list()
-    """The analyses."""
+    """Analyses that the tool runs."""
 
 
 class Tool(Object, abstract=True):

@@ -103,7 +103,7 @@ class MarkerWeightSet(Set, tag="Set_MarkerWeight_"):
     """Weights of markers."""
 
     objects: LegacyMany[MarkerWeight] = make_empty_list()
-    """The weights."""
+    """Weights of markers; those without one have the default weight of the reference."""
 
 
 class MarkersReference(Object):

@@ -34,7 +34,7 @@ class PolynomialPathFitter(Object):
     """Fits polynomials of the coordinates to lengths and moment arms of paths."""
 
     model: Single[ModelProcessor] = make_default(ModelProcessor, name="model")
-    """The model."""
+    """Model whose paths are fitted."""
     coordinate_values: Single[TableProcessor] = make_default(
         TableProcessor, name="coordinate_values"
     )

@@ -35,7 +35,7 @@ class APDMDataReaderSettings(Object):
     """Settings for reading files of APDM sensors."""
 
     ExperimentalSensors: Many[ExperimentalSensor] = make_empty_list()
-    """The sensors."""
+    """Sensors whose files are read."""
 
 
 class XsensDataReaderSettings(Object):
@@ -50,4 +50,4 @@ class XsensDataReaderSettings(Object):
     sampling_rate: Annotated[float, real("Hz")] = 40.0
     """Sampling rate of the sensors, if the files do not state it."""
     ExperimentalSensors: Many[ExperimentalSensor] = make_empty_list()
-    """The sensors."""
+    """Sensors whose files are read."""

@@ -122,7 +122,7 @@ class CMC_TaskSet(Set):
     """Tasks that RRA and CMC follow."""
 
     objects: LegacyMany[TrackingTask] = make_empty_list()
-    """The tasks."""
+    """Tasks in any order."""
 
 
 class CMCTool(AbstractTool):
@@ -150,7 +150,7 @@ class CMCTool(AbstractTool):
     use_fast_optimization_target: LegacyFlag = True
     """Whether accelerations must be met exactly, which is faster and can fail."""
     optimizer_algorithm: _Optimizer = "ipopt"
-    """The optimizer."""
+    """Optimizer that distributes forces over actuators."""
     numerical_derivative_step_size: LegacyNumber = 1e-4
     """Step of the optimizer's numerical derivatives."""
     optimization_convergence_tolerance: LegacyNumber = 1e-4
@@ -177,7 +177,7 @@ class RRATool(AbstractTool):
     lowpass_cutoff_frequency: Annotated[float, real("Hz", legacy=True)] = -1.0
     """Cut-off frequency of the filter of the motion; negative for no filter."""
     optimizer_algorithm: _Optimizer = "ipopt"
-    """The optimizer."""
+    """Optimizer that distributes forces over actuators."""
     numerical_derivative_step_size: LegacyNumber = 1e-4
     """Step of the optimizer's numerical derivatives."""
     optimization_convergence_tolerance: LegacyNumber = 1e-5
