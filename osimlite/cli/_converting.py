@@ -325,8 +325,9 @@ class Request:
         from osimlite.schema.forces import Force
         from osimlite.schema.frames import Body
         from osimlite.translate.fidelity import LEFT_OUT, Fidelity
-        from osimlite.view.incomplete import build_showable
+        from osimlite.view.incomplete import MISSING_MESH, build_showable
         from osimlite.view.model_view import ModelView
+        from osimlite.view.recording import Recording
 
         model, mechanism, left_out = build_showable(model)
         model_view = ModelView.from_model(
@@ -343,8 +344,17 @@ class Request:
                 "a force or muscle",
                 f"{LEFT_OUT}; its path is drawn if it has one",
             )
-        for remark in model_view.remarks:
-            fidelity.add("view", "/", remark, LEFT_OUT)
+        for part_path, reason in model_view.scene.remarks:
+            if reason.startswith(MISSING_MESH):
+                # The table counts parts of one kind: the name of the file is a detail.
+                _, _, next_step = reason.partition("; ")
+                kind, done = "a mesh whose file was not found", f"{LEFT_OUT}; {next_step}"
+            else:
+                kind, done = reason, LEFT_OUT
+            fidelity.add("view", part_path, kind, done, reason)
+        if isinstance(model_view.motion, Recording):
+            for remark in model_view.motion.remarks:
+                fidelity.add("view", "/", remark, LEFT_OUT)
         path = make_folder(self.folder) / f"{self.name}{exporter.suffix}"
         defaults = {option.name: option.default for option in exporter.choices}
         exporter.write(model_view, path, **{**defaults, **option_values})

@@ -41,7 +41,7 @@ StartSpeed = Annotated[
         "--set-speed", metavar="NAME=VALUE", help="Initial speed of a coordinate (rad/s or m/s)."
     ),
 ]
-To = Annotated[float, Option("--to", metavar="SECONDS", help="Duration of the simulation.")]
+To = Annotated[float, Option("--to", metavar="SECONDS", help="End time of the simulation.")]
 Engine = Annotated[
     str | None,
     Option(

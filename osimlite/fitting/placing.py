@@ -75,7 +75,7 @@ def place_markers(
         raise SettingError(
             f"'{data.file or 'the static trial'}' has one frame, at {data.times[0]:g} s, but the "
             "markers are averaged "
-            "over a range of times, as in OpenSim; repeat the row at a later time"
+            "over a range of times, as in OpenSim; add a copy of the row with a later time"
         )
     if not is_in_range.any() or not start < end:
         raise SettingError(

@@ -98,7 +98,7 @@ def describe_consequences(rule: Rule) -> str:
     if not rule.consequences:
         return ""
     first, *others = map(_CONSEQUENCE_TEXTS.__getitem__, rule.consequences)
-    return f"{first} in some cases; in others it {', or '.join(others)}" if others else first
+    return f"in some cases it {first}; in others it {', or '.join(others)}" if others else first
 
 
 def format_index() -> str:

@@ -397,8 +397,8 @@ def compute_report_times(end: float, interval: float, start: float = 0.0) -> lis
         if not _is_number(number):
             raise SettingError(f"a time is a number of seconds, not {number!r}")
     if not (isfinite(end) and end > start):
-        expected = "a positive time" if start == 0.0 else f"after its start at {start:g} s"
-        raise SettingError(f"the end of a simulation is {expected}, not {end:g} s")
+        expected = "positive" if start == 0.0 else f"later than its start, {start:g} s"
+        raise SettingError(f"the end time of a simulation must be {expected}, found {end:g} s")
     if not (isfinite(interval) and interval > 0.0):
         raise SettingError(f"the report interval is a positive time, not {interval:g} s")
     # Ten million rows fill the memory.

@@ -19,7 +19,8 @@ MAX_REMARKS = 12
 MAX_SAME = 3
 """Largest number of parts with the same reason that are named."""
 
-_MISSING_MESH = "the mesh file"
+MISSING_MESH = "the mesh file"
+"""Beginning of the reason why a mesh is not drawn if its file is missing."""
 _QUOTED_PATH = compile_later(r"'(/[^']+)'")
 
 
@@ -122,10 +123,10 @@ def describe_left_out(
     # Parts with the same reason are one sentence: a model may have a hundred paths without points.
     groups: dict[str, list[tuple[str, str]]] = {}
     for path, reason in parts:
-        key = _MISSING_MESH if reason.startswith(_MISSING_MESH) else reason
+        key = MISSING_MESH if reason.startswith(MISSING_MESH) else reason
         groups.setdefault(key, []).append((path, reason))
     # Missing files are the most frequent reason, and the least surprising one: they come last.
-    meshes = groups.pop(_MISSING_MESH, [])
+    meshes = groups.pop(MISSING_MESH, [])
     rows = [
         row
         for group in groups.values()

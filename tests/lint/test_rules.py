@@ -190,7 +190,8 @@ def test_a_page_says_severity_mends_and_settings():
     )
     assert "Fix: sometimes, with --fix\n" in pages["OSIM104"]
     assert (
-        "\nOpenSim: rejects the file in some cases; in others it computes NaN\n" in pages["OSIM407"]
+        "\nOpenSim: in some cases it rejects the file; in others it computes NaN\n"
+        in pages["OSIM407"]
     )
     assert "\nOpenSim: " not in pages["OSIM311"]
     assert "\nOpenSim, if the finding is an error: rejects the file\n" in pages["OSIM701"]

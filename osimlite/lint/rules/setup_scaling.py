@@ -80,7 +80,7 @@ is lost.
   <marker_file>leg.trc</marker_file> <time_range>0 0.5</time_range>
 + <output_model_file>placed.osim</output_model_file>
 12 static-times, error, in placer: The time range of the static trial is empty, or the trial has a single
-frame. OpenSim fails; repeat the frame at a later time.
+frame. OpenSim fails. Add a copy of the frame with a later time.
   <marker_file>leg.trc</marker_file> <output_model_file>placed.osim</output_model_file>
 - <time_range>0.5 0.5</time_range>
 + <time_range>0 0.5</time_range>
@@ -214,7 +214,7 @@ def _check_static_times(setup: Setup, placer: Any, report: FindingCollector) -> 
     if table.span[0] == table.span[1]:
         report(
             f"'{placer.marker_file}' has one frame, at {table.span[0]:g} s, but OpenSim averages "
-            "over a range of times and fails; repeat the row at a later time",
+            "over a range of times and fails; add a copy of the row with a later time",
             placer,
             tag="marker_file",
             fault="static-times",

@@ -277,7 +277,7 @@ def report_table_count(table: Table, report: FindingCollector) -> None:
 def report_table_setting(table: Table, report: FindingCollector) -> None:
     """A setting in the header of a table has an unknown value.
 
-    Checks `inDegrees`, which must be `yes` or `no`, the letter case of keys, `version` and
+    Checks `inDegrees` (`yes` or `no`), the letter case of keys, `version` and
     `DataType`. In marker files, checks `Units` (m, cm, mm) and `DataRate`. A `DataRate` that does
     not fit the times is an info.
 

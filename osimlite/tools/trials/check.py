@@ -282,8 +282,7 @@ def _plan_tracking(
     claimed.update(file for file in (force, error) if file is not None)
     if force is None:
         missing_error = MissingInput(
-            f"the forces of {tool} are missing ('{tool.setup.name}_Actuation_force.sto'); run this setup "
-            "in OpenSim"
+            f"the forces of {tool} are missing ('{tool.setup.name}_Actuation_force.sto'); run this setup"
         )
         yield "residuals", partial(_raise_missing, missing_error)
     else:

@@ -113,7 +113,7 @@ def _describe_loss(child: Element, default: str) -> str | None:
 
 
 def name_paths(draft: Draft) -> None:
-    """Name the <GeometryPath> of a force 'path'."""
+    """Give the <GeometryPath> of each force the name 'path'."""
     for path in draft.find_tagged("GeometryPath"):
         force = path.getparent()
         # Only the first path of a force is read.
