@@ -88,6 +88,7 @@ def replace_by_ideal_actuators(model: Model, physiology: bool) -> list[ScalarAct
         result.append(item)
     if not result:
         raise ModelError(
-            f"'{model.name}' has no actuators; add reserve actuators: a ForceSet in force_set_files of the setup, or with --forces"
+            f"'{model.name}' has no actuators; add reserve actuators: a ForceSet in force_set_files "
+            "of the setup, or with --forces"
         )
     return result

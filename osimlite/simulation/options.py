@@ -400,7 +400,7 @@ def compute_report_times(end: float, interval: float, start: float = 0.0) -> lis
         expected = "positive" if start == 0.0 else f"later than its start, {start:g} s"
         raise SettingError(f"the end time of a simulation must be {expected}, found {end:g} s")
     if not (isfinite(interval) and interval > 0.0):
-        raise SettingError(f"the report interval is a positive time, not {interval:g} s")
+        raise SettingError(f"the report interval must be positive, found {interval:g} s")
     # Ten million rows fill the memory.
     if end / interval > 1e7:
         raise SettingError(

@@ -142,7 +142,7 @@ def test_fixed_step(walker, tmp_path):
         (["--set", "Pelvis_tx=3deg"], 2, "m, cm or mm"),
         (["--set", "RHip_rz=3cm"], 2, "deg or rad"),
         (["--set", "platform_rz=0"], 1, "is locked"),
-        (["--to", "-1"], 2, "positive time"),
+        (["--to", "-1"], 2, "must be positive"),
         (["--set-speed", "Pelvis_tx=3deg"], 2, "m/s, cm/s or mm/s"),
         (
             ["--fixed-step", "0.1", "--accuracy", "1e-3"],

@@ -111,9 +111,9 @@ def test_unknown_coordinate_names_the_nearest(walker):
 @pytest.mark.parametrize(
     ("setting", "words"),
     [
-        ({"to": 0.0}, "positive time"),
-        ({"to": float("nan")}, "positive time"),
-        ({"report_interval": 0.0}, "positive time"),
+        ({"to": 0.0}, "must be positive"),
+        ({"to": float("nan")}, "must be positive"),
+        ({"report_interval": 0.0}, "must be positive"),
         ({"report_interval": 1e-9}, "ten million rows"),
         ({"accuracy": 0.0}, "between 0 and 1"),
         ({"fixed_step": -1e-3}, "positive and finite"),
