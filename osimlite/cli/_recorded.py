@@ -94,9 +94,9 @@ def warn_of_extrapolated_loads(loads: str | Path | None, recorded: RecordedMotio
     first, last = recorded.times[0], recorded.times[-1]
     if first < times[0] - slack or last > times[-1] + slack:
         say(
-            f"warning: the loads are measured from {times[0]:g} to {times[-1]:g} s, but the motion lasts from {first:g} "
-            f"to {last:g} s: as in OpenSim, the loads are extrapolated, which can make them very large; limit the times "
-            "with --from and --until"
+            f"warning: the loads are measured from {times[0]:g} to {times[-1]:g} s, but the motion "
+            f"lasts from {first:g} to {last:g} s: as in OpenSim, the loads are extrapolated, which "
+            "can make them very large; limit the times with --from and --until"
         )
 
 

@@ -302,8 +302,8 @@ def _describe_run(trajectory: Trajectory, files: Sequence[Path], model: Model) -
     if soft := _find_soft_contacts(model):
         facts.add(
             "warning",
-            f"contacts with a stiffness of 0 exert no force here, and NaN in OpenSim: {join_words(soft, max_count=3)}; "
-            "'osimlite validate' shows the lines",
+            "contacts with a stiffness of 0 exert no force here, while OpenSim computes NaN: "
+            f"{join_words(soft, max_count=3)}; 'osimlite validate' shows the lines",
         )
     first, last = (summary["energy_J"][moment]["total"] for moment in ("start", "end"))
     facts.add("energy", f"{first:.6g} J at the start, {last:.6g} J at the end")

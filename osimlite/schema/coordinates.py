@@ -23,7 +23,7 @@ class Coordinate(ModelComponent):
     """Lowest and highest value that a user interface offers; a simulation ignores it."""
     # OpenSim rejects a clamped coordinate whose default value is outside of the range.
     clamped: Flag = False
-    """Whether values that are set must lie within `range`; motion may still leave it."""
+    """Whether the default and values that are set must lie in `range`; motion may still leave it."""
     # OpenSim reads true, false, 1 and 0 only: after `yes` the coordinate is free, with a line in
     # the log.
     locked: Flag = False

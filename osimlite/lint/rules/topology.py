@@ -31,8 +31,9 @@ def report_unconnected_body(subject: Subject, report: FindingCollector) -> None:
     Reports bodies that no chain of joints connects to ground.
 
     OpenSim adds a free joint to ground, and the body falls freely (a warning). If the body has no
-    mass, OpenSim rejects the model. OpenSim adds such joints late: it may also reject the model, or
-    crash, if offset frames or other joints are on an unconnected body.
+    mass, OpenSim rejects the model. With each joint that it adds, OpenSim loses the order of the
+    joints before it. It may then reject the model, or crash, if offset frames or further joints are
+    on the bodies of these joints.
 
     ```xml
       <Body name="ball"> <mass>1</mass> <inertia>0.1 0.1 0.1 0 0 0</inertia> </Body>
