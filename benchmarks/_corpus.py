@@ -1,15 +1,27 @@
-"""Location of the real models that benchmarks read, and functions that unpack them.
+"""Location of the models and setups that benchmarks read, and functions that unpack them.
 
-The models are in the folder ``shared`` beside the repository. Not every machine has it.
+Most are in the folder ``shared`` beside the repository. Not every machine has it.
 """
 
 from __future__ import annotations
 
 import gzip
+from collections.abc import Iterable
 from pathlib import Path
 
-CORPUS = Path(__file__).resolve().parents[2] / "shared" / "corpus" / "converted"
+ROOT = Path(__file__).resolve().parents[1]
+"""Folder of the repository."""
+
+FIXTURES = ROOT / "fixtures"
+
+WALKER = FIXTURES / "walker" / "DynamicWalkerModel.osim"
+"""File of OpenSim's Dynamic Walker."""
+
+CORPUS = ROOT.parent / "shared" / "corpus" / "converted"
 """Folder of public models, compressed as ``m0954.osim.gz`` and the like."""
+
+REFERENCE = ROOT.parent / "shared" / "oracle" / "tools" / "reference"
+"""Folder of setups and results of OpenSim's tools; many files are compressed."""
 
 
 def unpack_file(source: Path, target: Path) -> Path:
@@ -30,6 +42,22 @@ def unpack_file(source: Path, target: Path) -> Path:
     return target
 
 
+def unpack_files(sources: Iterable[Path], target_folder: Path) -> list[Path]:
+    """Copy files into a folder, without compression.
+
+    Args:
+        sources: files to read; the suffix ``.gz`` is removed from the names of their copies.
+        target_folder: existing folder for the copies.
+
+    Returns:
+        The copies, sorted by the names of their sources.
+    """
+    return [
+        unpack_file(source, target_folder / source.name.removesuffix(".gz"))
+        for source in sorted(sources)
+    ]
+
+
 def unpack_models(folder: Path, target_folder: Path) -> list[Path]:
     """Copy all model files of a folder into another folder, without compression.
 
@@ -40,7 +68,4 @@ def unpack_models(folder: Path, target_folder: Path) -> list[Path]:
     Returns:
         The copies, sorted by the names of their sources.
     """
-    return [
-        unpack_file(source, target_folder / source.name.removesuffix(".gz"))
-        for source in sorted(folder.glob("*.osim*"))
-    ]
+    return unpack_files(folder.glob("*.osim*"), target_folder)

@@ -14,6 +14,7 @@ from __future__ import annotations
 import os
 import shlex
 import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -74,15 +75,21 @@ def time_pair(
             f"a pair needs at least 1 round and no negative warm-up, not {rounds} and {warmup}"
         )
 
-    def measure_time(work: Callable[[], object]) -> float:
-        start = clock()
-        work()
-        return clock() - start
-
     # The first runs fill caches of files, code and memory, which later runs find filled.
-    times = [(measure_time(ours), measure_time(theirs)) for _ in range(warmup + rounds)]
+    times = [
+        (measure_time(ours, clock), measure_time(theirs, clock)) for _ in range(warmup + rounds)
+    ]
     counted = times[warmup:]
     return Pair(name, tuple(a for a, _ in counted), tuple(b for _, b in counted))
+
+
+def measure_time(
+    work: Callable[[], object], clock: Callable[[], float] = time.perf_counter
+) -> float:
+    """Return the time that a function takes by a clock (s)."""
+    start = clock()
+    work()
+    return clock() - start
 
 
 def time_command_pair(
@@ -126,10 +133,6 @@ def run_command(command: str | Sequence[str]) -> None:
         RuntimeError: the command failed; the message ends with its standard error.
     """
     arguments = shlex.split(command) if isinstance(command, str) else list(command)
-    # With this variable Python compiles every module again in every process. Users do not set it.
-    environment = {
-        name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"
-    }
     process = subprocess.run(
         arguments,
         # A command that asks a question must not wait for an answer.
@@ -137,7 +140,7 @@ def run_command(command: str | Sequence[str]) -> None:
         # Printing to a terminal would take time.
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
-        env=environment,
+        env=copy_user_environment(),
         check=False,
     )
     if process.returncode != 0:
@@ -145,6 +148,43 @@ def run_command(command: str | Sequence[str]) -> None:
         raise RuntimeError(
             f"{shlex.join(arguments)} ended with exit code {process.returncode}: {message}"
         )
+
+
+def copy_user_environment() -> dict[str, str]:
+    """Return the environment variables of this process, without one that users do not set.
+
+    With `PYTHONDONTWRITEBYTECODE`, Python compiles every module again in every process.
+    """
+    return {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+
+
+def use_one_blas_thread() -> None:
+    """Start the running script again with one thread of OpenBLAS, as the command `osimlite` does.
+
+    Scripts that measure processor time call this first. On a busy machine, threads of OpenBLAS that
+    wait for each other use up to twenty times the processor time of the work.
+    """
+    if "OPENBLAS_NUM_THREADS" not in os.environ:
+        # OpenBLAS reads the variable when it is loaded, which numpy has done already.
+        os.environ["OPENBLAS_NUM_THREADS"] = "1"
+        os.execv(sys.executable, sys.orig_argv)
+
+
+def run_script(script: str, *arguments: str) -> str:
+    """Run a Python script in a process of its own, and return the last line that it prints.
+
+    Args:
+        script: text of the script.
+        *arguments: its arguments.
+
+    Raises:
+        subprocess.CalledProcessError: the script fails.
+    """
+    process = subprocess.run(
+        [sys.executable, "-c", script, *arguments], capture_output=True, text=True, check=True
+    )
+    # Libraries may print messages before.
+    return process.stdout.splitlines()[-1]
 
 
 def print_pairs(title: str, pairs: Iterable[Pair], *, console: Console | None = None) -> None:

@@ -26,6 +26,7 @@ from typing import Any
 import numpy as np
 
 import osimlite
+from _pair import use_one_blas_thread
 from osimlite.fitting.inverse_kinematics import find_marker_stations
 from osimlite.fitting.marker_data import MarkerData
 from osimlite.fitting.person import Person
@@ -282,6 +283,7 @@ def simulate_markers(
 
 def main() -> None:
     """Fit the person of the command line, then the synthetic ones."""
+    use_one_blas_thread()
     folder, *count = sys.argv[1:]
     poses = np.concatenate(compare_with_expert(Path(folder)))
     generic = osimlite.read(Path(folder) / "generic.osim")

@@ -29,6 +29,7 @@ from typing import Any
 import numpy as np
 
 import osimlite
+from _pair import use_one_blas_thread
 from osimlite.errors import OsimliteError
 from osimlite.fitting.fitted_motion import FittedMotion
 from osimlite.fitting.ik_tool import collect_targets, run_inverse_kinematics
@@ -145,9 +146,9 @@ def compute_costs(motion: FittedMotion, tasks: Any, poses: Array) -> Array:
     # As in OpenSim, a marker without a measured position has no weight in that frame.
     weights = np.where(np.isfinite(squares), marker_weights, 0.0)
     costs = np.sum(weights * np.nan_to_num(squares), axis=1) / weights.sum(axis=1)
-    for goal, wanted in zip(targets.goals, targets.target_values.T, strict=True):
+    for goal, target in zip(targets.goals, targets.target_values.T, strict=True):
         if not infos[goal.coordinate].locked:
-            costs += goal.weight * (poses[:, goal.coordinate] - wanted) ** 2
+            costs += goal.weight * (poses[:, goal.coordinate] - target) ** 2
     return np.asarray(0.5 * costs)
 
 
@@ -393,6 +394,7 @@ def format_rms(distances: Array) -> str:
 if __name__ == "__main__":
     if sys.argv[1:2] not in (["setups"], ["people"]):
         sys.exit(__doc__)
+    use_one_blas_thread()
     for folder_name in sys.argv[2:]:
         compare_folder = compare_setups if sys.argv[1] == "setups" else compare_people
         for line in compare_folder(Path(folder_name)):
