@@ -12,6 +12,7 @@ from math import cos, pi, sin
 from pathlib import Path
 
 import osimlite
+from _corpus import WALKER
 from osimlite.models.jumper import jumper
 from osimlite.schema.actuators import CoordinateActuator
 from osimlite.schema.constraint_types import CoordinateCouplerConstraint
@@ -28,9 +29,10 @@ from osimlite.schema.paths import GeometryPath, PathPoint, PathPointSet, PathWra
 from osimlite.schema.splines import SimmSpline
 from osimlite.schema.wrap_types import WrapCylinder, WrapEllipsoid
 
-WALKER = Path(__file__).resolve().parents[1] / "fixtures" / "walker" / "DynamicWalkerModel.osim"
-
 AXES: tuple[Vec3, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+SIDES = {"r": 1.0, "l": -1.0}
+"""Direction of each side along the z axis, by the suffix of its names."""
 
 LEG_BODIES = ("pelvis", "femur", "tibia", "talus", "calcn")
 """Bodies between which the muscles of a leg run, from proximal to distal."""
@@ -66,28 +68,21 @@ def make_human() -> Model:
         translation_count=3,
     )
     add_custom_joint(model, "back", pelvis, torso, (-0.1, 0.08, 0.0), rotation_count=3)
-    for side, z in (("r", 1.0), ("l", -1.0)):
-        add_leg(model, pelvis, side, z)
-        add_arm(model, torso, side, z)
+    for side in SIDES:
+        add_leg(model, pelvis, side)
+        add_arm(model, torso, side)
     add_motors(model)
     add_markers(model)
     set_tendon_lengths(model)
     return model
 
 
-def add_arm(model: Model, torso: Body, side: str, z: float) -> None:
-    """Add upper arm, forearm and hand of one side.
-
-    Args:
-        model: model to change.
-        torso: parent of the shoulder.
-        side: suffix of the names, ``r`` or ``l``.
-        z: direction of that side along the z axis, 1 or -1.
-    """
+def add_arm(model: Model, torso: Body, side: str) -> None:
+    """Add upper arm, forearm and hand of one of `SIDES` to the torso."""
     humerus, ulna, hand = (
         add_body(model, f"{name}_{side}", 1.0) for name in ("humerus", "ulna", "hand")
     )
-    shoulder = (0.0, 0.37, 0.17 * z)
+    shoulder = (0.0, 0.37, 0.17 * SIDES[side])
     add_custom_joint(model, f"shoulder_{side}", torso, humerus, shoulder, rotation_count=3)
     add_custom_joint(model, f"elbow_{side}", humerus, ulna, (0.01, -0.28, 0.0), rotation_count=2)
     add_custom_joint(model, f"wrist_{side}", ulna, hand, (0.0, -0.24, 0.0), rotation_count=2)
@@ -179,19 +174,12 @@ def add_custom_joint(
     model.add(joint.between(parent, child, at=location))
 
 
-def add_leg(model: Model, pelvis: Body, side: str, z: float) -> None:
-    """Add thigh, shank, patella and foot of one side, with wrap surfaces and muscles.
-
-    Args:
-        model: model to change.
-        pelvis: parent of the hip.
-        side: suffix of the names, ``r`` or ``l``.
-        z: direction of that side along the z axis, 1 or -1.
-    """
+def add_leg(model: Model, pelvis: Body, side: str) -> None:
+    """Add a leg of one of `SIDES` to the pelvis, with patella, wrap surfaces and muscles."""
     bodies = {"pelvis": pelvis}
     for name in LEG_BODIES[1:]:
         bodies[name] = add_body(model, f"{name}_{side}", 3.0)
-    hip = (-0.06, -0.08, 0.08 * z)
+    hip = (-0.06, -0.08, 0.08 * SIDES[side])
     add_custom_joint(model, f"hip_{side}", pelvis, bodies["femur"], hip, rotation_count=3)
     add_knee(model, bodies["femur"], bodies["tibia"], side)
     foot_joints = (
@@ -202,7 +190,7 @@ def add_leg(model: Model, pelvis: Body, side: str, z: float) -> None:
         angle = Coordinate(name=f"{name}_angle_{side}", range=(-0.9, 0.9))
         pin = PinJoint(name=f"{name}_joint_{side}", coordinates=[angle])
         model.add(pin.between(bodies[parent], bodies[name], at=location))
-    add_wrap_surfaces(bodies, side, z)
+    add_wrap_surfaces(bodies, side)
     for number in range(MUSCLES_PER_LEG):
         add_muscle(model, bodies, side, number)
 
@@ -241,8 +229,8 @@ def add_knee(model: Model, femur: Body, tibia: Body, side: str) -> None:
     )
 
 
-def add_wrap_surfaces(bodies: dict[str, Body], side: str, z: float) -> None:
-    """Add the four wrap surfaces of a leg to its bodies; see `add_leg` for the arguments."""
+def add_wrap_surfaces(bodies: dict[str, Body], side: str) -> None:
+    """Add the four wrap surfaces of a leg to its bodies, by the names of `LEG_BODIES`."""
     hip = WrapCylinder(name=f"hip_{side}", translation=(0.0, -0.02, 0.0), radius=0.03, length=0.2)
     condyles = WrapCylinder(
         name=f"condyles_{side}", translation=(0.0, -0.4, 0.0), radius=0.025, length=0.2
@@ -251,7 +239,9 @@ def add_wrap_surfaces(bodies: dict[str, Body], side: str, z: float) -> None:
         name=f"shank_{side}", translation=(0.0, -0.05, 0.0), radius=0.02, length=0.2
     )
     seat = WrapEllipsoid(
-        name=f"seat_{side}", translation=(-0.1, -0.1, 0.08 * z), dimensions=(0.04,) * 3
+        name=f"seat_{side}",
+        translation=(-0.1, -0.1, 0.08 * SIDES[side]),
+        dimensions=(0.04,) * 3,
     )
     bodies["femur"].wrap_object_set.objects += [hip, condyles]
     bodies["tibia"].wrap_object_set.objects.append(shank)

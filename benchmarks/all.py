@@ -30,12 +30,11 @@ from rich.console import Console
 from rich.table import Table
 
 import osimlite
-from _corpus import CORPUS, unpack_file, unpack_models
+from _corpus import CORPUS, WALKER, unpack_file, unpack_models
 from _pair import Pair, time_command_pair, time_pair
 from osimlite.simulation import Simulation
 from simulate import (
     ACCURACIES,
-    MODEL,
     OPENSIM_SCRIPT,
     TO,
     prepare_opensim_runs,
@@ -95,7 +94,7 @@ def compare_all(rounds: int, folder: Path, work_folder: Path) -> Iterator[Compar
         folder: folder in which models are looked for.
         work_folder: folder for unpacked models and results.
     """
-    files = {"walker": MODEL, **find_models(folder, work_folder)}
+    files = {"walker": WALKER, **find_models(folder, work_folder)}
     yield from compare_motions(rounds)
     yield from compare_validation(files, rounds)
     yield compare_reading(work_folder, rounds)
@@ -127,9 +126,9 @@ def compare_motions(rounds: int) -> Iterator[Comparison]:
     `osimlite.simulate` prepares the model and simulates it. The last row is the simulation alone of
     a model that is prepared, as OpenSim's is.
     """
-    opensim_model = opensim.Model(str(MODEL))
+    opensim_model = opensim.Model(str(WALKER))
     opensim_model.initSystem()
-    model = osimlite.read(MODEL)
+    model = osimlite.read(WALKER)
     with Simulation(model, "compiled") as simulation:
         actions: list[tuple[str, Callable[[], object], float]] = [
             (
@@ -165,7 +164,7 @@ def compare_validation(files: dict[str, Path], rounds: int) -> Iterator[Comparis
 
 def compare_reading(work_folder: Path, rounds: int) -> Comparison:
     """Compare the total time of reading all small files, in this process."""
-    files = unpack_models(CORPUS, work_folder) if CORPUS.is_dir() else [MODEL]
+    files = unpack_models(CORPUS, work_folder) if CORPUS.is_dir() else [WALKER]
     small_files = [file for file in files if file.stat().st_size < SMALL_FILE_BYTES]
     pairs = [
         time_pair(
@@ -197,10 +196,10 @@ def compare_commands(
         )
         yield Comparison(pair, target=0.8)
     results = str(work_folder / "results")
-    program = OPENSIM_SCRIPT.format(model=str(MODEL), to=TO, accuracy=ACCURACY)
+    program = OPENSIM_SCRIPT.format(model=str(WALKER), to=TO, accuracy=ACCURACY)
     pair = time_command_pair(
         "osimlite simulate walker",
-        ours=build_command("simulate", str(MODEL), "--to", f"{TO:g}", "-o", results),
+        ours=build_command("simulate", str(WALKER), "--to", f"{TO:g}", "-o", results),
         theirs=[sys.executable, "-c", program],
         rounds=rounds,
     )
@@ -210,10 +209,10 @@ def compare_commands(
 def time_commands(rounds: int) -> Iterator[Comparison]:
     """Time commands for which OpenSim has no counterpart."""
     for name, words, target in (
-        ("info walker", ("info", str(MODEL)), 100),
-        ("validate walker, first", ("validate", "--no-cache", str(MODEL)), 90),
+        ("info walker", ("info", str(WALKER)), 100),
+        ("validate walker, first", ("validate", "--no-cache", str(WALKER)), 90),
         # The warm-up writes the cache that the timed rounds find.
-        ("validate walker, unchanged", ("validate", str(MODEL)), 40),
+        ("validate walker, unchanged", ("validate", str(WALKER)), 40),
     ):
         # They run in turn with a Python that does nothing, which shows how fast the machine is.
         pair = time_command_pair(

@@ -22,9 +22,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 from statistics import median
 from typing import Any
 
@@ -34,9 +32,11 @@ from rich.console import Console
 from rich.table import Table
 
 import osimlite
+from _corpus import WALKER
+from _pair import measure_time
 from osimlite.simulation import Simulation
 from osimlite.simulation.batches import run_many
-from simulate import MODEL, TO
+from simulate import TO
 
 ACCURACIES = (1e-3, 1e-5, 1e-6)
 
@@ -77,7 +77,7 @@ def compare_sweeps(simulation: Any) -> Table:
     for heading in ("accuracy", "osimlite", "OpenSim", "ratio", "largest difference at 2 s"):
         table.add_column(heading, justify="right")
     rows = make_initial_states(simulation, WALKER_COUNT)
-    model = opensim.Model(str(MODEL))
+    model = opensim.Model(str(WALKER))
     state = model.initSystem()
     for accuracy in ACCURACIES:
         run_sweep = partial(
@@ -159,7 +159,7 @@ def measure_threads(simulation: Any) -> Table:
     for count in range(1, (os.cpu_count() or 1) + 1):
         run_sweep = partial(run_many, simulation.engine, rows, TO, threads=count)
         processor_time = min(measure_time(run_sweep, time.process_time) for _ in range(ROUNDS))
-        wall_time = min(measure_time(run_sweep, time.perf_counter) for _ in range(ROUNDS))
+        wall_time = min(measure_time(run_sweep) for _ in range(ROUNDS))
         table.add_row(
             str(count),
             f"{WALKER_COUNT / wall_time:.0f}",
@@ -182,7 +182,7 @@ def measure_processes() -> Table:
             ("compiled, second", "compiled"),
             ("PyBullet", "bullet"),
         ):
-            program = PROCESS.format(model=str(Path(MODEL)), to=TO, engine=engine)
+            program = PROCESS.format(model=str(WALKER), to=TO, engine=engine)
             run_process = partial(
                 subprocess.run,
                 [sys.executable, "-c", program],
@@ -190,22 +190,15 @@ def measure_processes() -> Table:
                 check=True,
                 capture_output=True,
             )
-            table.add_row(name, f"{measure_time(run_process, time.perf_counter):.2f}")
+            table.add_row(name, f"{measure_time(run_process):.2f}")
     return table
-
-
-def measure_time(work: Callable[[], object], clock: Callable[[], float]) -> float:
-    """Return how long a work takes by a clock (s)."""
-    start = clock()
-    work()
-    return clock() - start
 
 
 def main() -> None:
     """Print the three tables."""
     opensim.Logger.setLevelString("off")
     console = Console()
-    with Simulation(osimlite.read(MODEL), "compiled") as simulation:
+    with Simulation(osimlite.read(WALKER), "compiled") as simulation:
         console.print(compare_sweeps(simulation))
         console.print(measure_threads(simulation))
     console.print(measure_processes())

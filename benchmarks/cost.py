@@ -3,7 +3,7 @@
     python benchmarks/cost.py [WORD ...]     print the table, for actions whose names have a WORD
     python benchmarks/cost.py --accept       write cost.json; say in the commit why costs have grown
 
-The table has one row for each action and one column for each kind of cost. Behind a number stands
+The table has one row for each action and one column for each kind of cost. A number is followed by
 its change from the accepted number in cost.json. Below the table, each change of more than 3 % is
 listed with the functions and modules that cause it.
 
@@ -439,7 +439,7 @@ def write_accepted(costs: Mapping[str, Cost]) -> None:
         parts[name] = {kind: dict(sorted(table.items())) for kind, table in sums.items()}
         for module in cost.parts["modules"]:
             modules.setdefault(module, []).append(name)
-    # Modules that the same actions load stand together: otherwise the file is ten times as long.
+    # Group modules that the same actions load: otherwise the file is ten times as long.
     groups: dict[str, list[str]] = {}
     for module, names in sorted(modules.items()):
         groups.setdefault(" | ".join(names), []).append(module)

@@ -27,7 +27,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-ROOT = Path(__file__).resolve().parents[1]
+from _corpus import ROOT
+from _pair import run_script
 
 STATE_COUNT = 3
 """Number of random states at which errors are measured."""
@@ -181,16 +182,11 @@ def format_row(row: dict[str, Any]) -> str:
 
 def measure_opensim(path: Path) -> str:
     """Return the times of OpenSim in words, nothing if OpenSim fails."""
-    process = subprocess.run(
+    try:
         # CasADi and OpenSim cannot be loaded in one process.
-        [sys.executable, "-c", OPENSIM_SCRIPT, str(path)],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    if process.returncode != 0:
+        value, size = map(float, run_script(OPENSIM_SCRIPT, str(path)).split())
+    except subprocess.CalledProcessError:
         return ""
-    value, size = map(float, process.stdout.split())
     # Forward differences need one evaluation for each state, and one at the state itself.
     return f"   OpenSim {value:.0f} us, Jacobian by differences {value * (size + 1):.0f} us"
 

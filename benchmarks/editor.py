@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import argparse
 import asyncio
-import os
 import statistics
 import sys
 import time
@@ -24,6 +23,7 @@ from lsprotocol import types
 from pygls.lsp.client import LanguageClient
 
 import osimlite
+from _pair import copy_user_environment
 from osimlite.models.dynamic_walker import dynamic_walker
 
 MARKER_BODIES = ("/bodyset/Pelvis", "/bodyset/RightThigh", "/bodyset/LeftShank")
@@ -48,7 +48,7 @@ def make_long_model(kilobytes: int) -> str:
     model.add(osimlite.PathSpring(name="spring0", stiffness=10.0, resting_length=0.2))
     number = 0
     while True:
-        # How long the text is, is known only when it has been written.
+        # The length of the text is known only after writing it.
         text = osimlite.to_text(model)
         missing = kilobytes * 1000 - len(text)
         if missing <= 0:
@@ -65,11 +65,7 @@ def make_long_model(kilobytes: int) -> str:
 
 async def start_server(client: LanguageClient) -> None:
     """Start the language server as an editor does, and wait until it is ready."""
-    # With this variable Python compiles every module again. Users do not set it.
-    environment = {
-        name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"
-    }
-    await client.start_io(sys.executable, "-m", "osimlite", "lsp", env=environment)
+    await client.start_io(sys.executable, "-m", "osimlite", "lsp", env=copy_user_environment())
     await client.initialize_async(types.InitializeParams(capabilities=types.ClientCapabilities()))
     client.initialized(types.InitializedParams())
 
@@ -113,7 +109,7 @@ async def measure_keystrokes(text: str, keystrokes: int) -> list[float]:
         offset = text.index(CONTACT_NAMES) + TYPED_COLUMN
         line = text.count("\n", 0, offset)
         column = offset - text.rfind("\n", 0, offset) - 1
-        # The name with the letter more.
+        # The misspelt name has one letter more.
         misspelt_length = len(CONTACT_NAMES.split()[0]) + 1
         misspelt_start = column - TYPED_COLUMN
         misspelt_range = types.Range(

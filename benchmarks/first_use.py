@@ -38,16 +38,9 @@ from typing import NamedTuple
 from rich.console import Console
 from rich.table import Table
 
-from _corpus import CORPUS, unpack_file
-
-SHARED = Path(__file__).resolve().parents[2] / "shared"
-
-REFERENCE = SHARED / "oracle" / "tools" / "reference"
-"""Folder of setups and results of OpenSim's tools."""
+from _corpus import CORPUS, REFERENCE, WALKER, unpack_file, unpack_files
 
 RAJAGOPAL = CORPUS / "m0954.osim.gz"
-
-WALKER = Path(__file__).resolve().parents[1] / "fixtures" / "walker" / "DynamicWalkerModel.osim"
 
 RESIDUAL_COORDINATES = (
     "pelvis_tx",
@@ -134,8 +127,7 @@ def prepare_files(folder: Path) -> None:
     for name in ("scale_gait2354", "ik_id_gait2354"):
         target = folder / name
         target.mkdir()
-        for file in (REFERENCE / name).iterdir():
-            unpack_file(file, target / file.name.removesuffix(".gz"))
+        unpack_files((REFERENCE / name).iterdir(), target)
     walk = folder / "ik_id_gait2354"
     unpack_file(
         REFERENCE / "models" / "gait2354_subject01_simbody.osim.gz", walk / "subject01_simbody.osim"

@@ -107,7 +107,7 @@ class AccuracyRun(NamedTuple):
 
 
 class IntegratorCost(NamedTuple):
-    """IntegratorCost of an integrator at `TARGET_ERROR`.
+    """Cost of an integrator at `TARGET_ERROR`.
 
     Attributes:
         seconds: processor time (s), infinite if no accuracy reaches the error.

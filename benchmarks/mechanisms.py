@@ -31,6 +31,7 @@ from rich.console import Console
 from rich.table import Table
 
 import osimlite
+from _corpus import CORPUS
 from osimlite import Body, Coordinate, Model, PinJoint
 from osimlite.errors import OsimliteError
 from osimlite.mechanics.multibody import Mechanism, build_mechanism
@@ -38,8 +39,6 @@ from osimlite.schema.forces import Force
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.engines import engine_factory
 from osimlite.simulation.engines.protocol import EngineSettings
-
-CORPUS = Path(__file__).resolve().parents[2] / "shared" / "corpus" / "converted"
 
 CHAIN_LENGTHS = (2, 5, 10, 20, 40, 80)
 """Numbers of pendulums in the chains."""

@@ -24,8 +24,7 @@ import opensim
 
 import osimlite
 import osimlite.mjcf
-
-WALKER = Path(__file__).resolve().parent.parent / "fixtures" / "walker" / "DynamicWalkerModel.osim"
+from _corpus import WALKER
 
 TO = 0.1
 """End of the simulation (s)."""

@@ -26,6 +26,7 @@ from rich.console import Console
 from rich.table import Table
 
 import osimlite
+from _corpus import CORPUS
 from _pair import Pair, print_pairs, time_pair
 from osimlite import (
     Body,
@@ -44,8 +45,6 @@ from osimlite.schema.path_forces import PathSpring
 from osimlite.simulation import Simulation
 from osimlite.simulation.elements.registry import FORCE_TYPES
 from simulate import prepare_opensim_runs, prepare_osimlite_runs
-
-CORPUS = Path(__file__).resolve().parents[2] / "shared" / "corpus" / "converted"
 
 CORPUS_MODELS = {
     "m0005": "gait10dof18musc",

@@ -18,7 +18,6 @@ simulations: the time of a sweep, and the memory of ten times as many runs.
 
 from __future__ import annotations
 
-import gzip
 import os
 import resource
 import subprocess
@@ -35,7 +34,7 @@ from rich.console import Console
 from rich.table import Table
 
 import osimlite
-from _corpus import CORPUS
+from _corpus import CORPUS, unpack_file
 from _pair import Pair, print_pairs, time_pair
 from osimlite.mechanics.kernels.layout import STAGE
 from osimlite.simulation import Simulation
@@ -134,8 +133,7 @@ def find_models(folder: Path) -> Iterator[tuple[str, Path]]:
     for name, number in CORPUS_MODELS.items():
         path = CORPUS / f"{number}.osim.gz"
         if path.exists():
-            (folder / f"{number}.osim").write_bytes(gzip.decompress(path.read_bytes()))
-            yield name, folder / f"{number}.osim"
+            yield name, unpack_file(path, folder / f"{number}.osim")
 
 
 def compare_model(name: str, path: Path, times: dict[str, list[Pair]], ends: Table) -> None:

@@ -39,13 +39,13 @@ from rich.console import Console
 from rich.table import Table
 
 import osimlite
+from _corpus import WALKER
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.studies.sweep.optimize import Objective, optimize
 from osimlite.studies.sweep.plan import plan
 from osimlite.studies.sweep.search import Search, run_cma
 from osimlite.studies.sweep.variables import Floats, Range
 
-MODEL = Path(__file__).resolve().parent.parent / "fixtures" / "walker" / "DynamicWalkerModel.osim"
 JOINTS = ("LHip_rz", "RHip_rz", "LKnee_rz", "RKnee_rz")
 FORWARD_SPEED = "Pelvis_tx/speed"
 VARIABLES = (*JOINTS, FORWARD_SPEED, *(f"{name}/speed" for name in JOINTS))
@@ -253,7 +253,7 @@ def measure(work: Callable[[], T]) -> tuple[T, float]:
 
 def read_start() -> Floats:
     """Return the first candidate (9,): the default state of the model, with a forward speed."""
-    mechanism = build_mechanism(osimlite.read(MODEL))
+    mechanism = build_mechanism(osimlite.read(WALKER))
     values, speeds = mechanism.default_state()
     indices = [mechanism.coordinate_index(name) for name in JOINTS]
     return np.array([*values[indices], START_SPEED, *speeds[indices]])
@@ -272,7 +272,7 @@ def optimize_as_example(start: Floats, seed: int, folder: Path, budget: int) -> 
     # make it a step in rad and m/s, as in the example.
     ranges = {name: (x - 0.5, x + 0.5) for name, x in zip(VARIABLES, start.tolist(), strict=True)}
     result = optimize(
-        plan(osimlite.read(MODEL), ranges, measures=(), to=TO),
+        plan(osimlite.read(WALKER), ranges, measures=(), to=TO),
         Objective(compute_cost, is_maximized=False),
         folder,
         budget=budget,
@@ -304,7 +304,7 @@ def optimize_with_bounds(
     }
     # The penalty of the example becomes a bound, and knees cannot be hyperextended.
     ranges |= {FORWARD_SPEED: (0.0, 2.0), "LKnee_rz": (-1.0, 0.0), "RKnee_rz": (-1.0, 0.0)}
-    bounded_plan = plan(osimlite.read(MODEL), ranges, measures=(), to=TO)
+    bounded_plan = plan(osimlite.read(WALKER), ranges, measures=(), to=TO)
     result = optimize(
         bounded_plan, Objective("distance"), folder, budget=budget, seed=seed, **options
     )
@@ -331,7 +331,7 @@ def optimize_in_opensim(opensim: Any, start: Floats, seed: int) -> tuple[float, 
     Returns:
         Distance of the best evaluation (m), and the distances with changed last bits.
     """
-    model = opensim.Model(str(MODEL))
+    model = opensim.Model(str(WALKER))
     state = model.initSystem()
     coordinates = model.getCoordinateSet()
     joints = [coordinates.get(name) for name in JOINTS]

@@ -12,8 +12,6 @@ byte code and results of an earlier run exist, as they do for users.
 from __future__ import annotations
 
 import argparse
-import gzip
-import os
 import resource
 import shutil
 import subprocess
@@ -26,12 +24,12 @@ from typing import NamedTuple
 from rich.console import Console
 from rich.table import Table
 
-from _corpus import CORPUS
+from _corpus import FIXTURES, REFERENCE, WALKER, unpack_file, unpack_files
+from _pair import copy_user_environment
 
-REFERENCE = CORPUS.parents[1] / "oracle" / "tools" / "reference"
-FIXTURES = Path(__file__).resolve().parent.parent / "fixtures"
-WALKER = FIXTURES / "walker/DynamicWalkerModel.osim"
-STEPS = FIXTURES / "pipelines/walking"
+MODELS = REFERENCE / "models"
+
+STEPS = FIXTURES / "pipelines" / "walking"
 """Setups of RRA and CMC that track steps of gait10."""
 
 TOOL_SCRIPT = (
@@ -65,17 +63,8 @@ def unpack(folder: Path, source: str) -> Path:
     """Copy a folder of the reference data into another, uncompressed, and return the copy."""
     target = folder / source
     target.mkdir()
-    for file in sorted((REFERENCE / source).iterdir()):
-        content = file.read_bytes()
-        if file.suffix == ".gz":
-            content = gzip.decompress(content)
-        (target / file.name.removesuffix(".gz")).write_bytes(content)
+    unpack_files((REFERENCE / source).iterdir(), target)
     return target
-
-
-def unpack_model(name: str, target: Path) -> None:
-    """Write a model of the reference data to a file, uncompressed."""
-    target.write_bytes(gzip.decompress((REFERENCE / "models" / f"{name}.osim.gz").read_bytes()))
 
 
 def unpack_steps(folder: Path) -> Path:
@@ -86,7 +75,7 @@ def unpack_steps(folder: Path) -> Path:
     # The setups use other names for files of the reference data.
     for name, source in (("loads.xml", "grf.xml"), ("reserves.xml", "reserve.xml")):
         shutil.copy(target / source, target / name)
-    unpack_model("gait10_subject01", target / "model.osim")
+    unpack_file(MODELS / "gait10_subject01.osim.gz", target / "model.osim")
     return target
 
 
@@ -95,7 +84,7 @@ def list_cases(folder: Path) -> list[ProcessCase]:
     osimlite = [sys.executable, "-m", "osimlite"]
     cases = []
     gait2354 = unpack(folder, "ik_id_gait2354")
-    unpack_model("gait2354_subject01_simbody", gait2354 / "subject01_simbody.osim")
+    unpack_file(MODELS / "gait2354_subject01_simbody.osim.gz", gait2354 / "subject01_simbody.osim")
     # Inverse dynamics reads the result of inverse kinematics, which may not be run.
     shutil.copy(gait2354 / "ik_accuracy_1e-5.mot", gait2354 / "subject01_walk1_ik.mot")
     steps = unpack_steps(folder)
@@ -133,13 +122,14 @@ def measure_process(command: list[str], folder: Path) -> float:
     Raises:
         RuntimeError: the process failed; the message ends with what it wrote to standard error.
     """
-    # With this variable Python compiles every module again, which users do not have.
-    environment = {
-        name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"
-    }
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     done = subprocess.run(
-        command, cwd=folder, env=environment, capture_output=True, text=True, check=False
+        command,
+        cwd=folder,
+        env=copy_user_environment(),
+        capture_output=True,
+        text=True,
+        check=False,
     )
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     if done.returncode:

@@ -14,7 +14,6 @@ has a process of its own.
 
 from __future__ import annotations
 
-import gzip
 import json
 import subprocess
 import sys
@@ -22,7 +21,9 @@ import tempfile
 from pathlib import Path
 from typing import NamedTuple
 
-ROOT = Path(__file__).resolve().parents[1]
+from _corpus import ROOT, unpack_file
+from _pair import run_script
+
 MOCO = ROOT.parent / "shared/oracle/moco"
 WALKING_EXAMPLE = ROOT.parent / "pub-opensim-core/OpenSim/Examples/Moco/example2DWalking"
 
@@ -123,11 +124,8 @@ def solve_and_print(title: str, name: str, intervals: int, refine: str, file: Pa
         file: file of the study.
     """
     arguments = [name, str(intervals), refine, str(file), str(WALKING_EXAMPLE)]
-    done = subprocess.run(
-        [sys.executable, "-c", SOLVE_SCRIPT, *arguments], capture_output=True, text=True, check=True
-    )
-    # The solver prints messages before the last line.
-    success, mesh, error, iterations, objective, seconds = json.loads(done.stdout.splitlines()[-1])
+    line = run_script(SOLVE_SCRIPT, *arguments)
+    success, mesh, error, iterations, objective, seconds = json.loads(line)
     note = "" if success else " (not solved)"
     print(
         f"| | {title}{note} | {mesh} | {error:.2g} | {iterations} | {objective:.7g} | {seconds:.3g} |",
@@ -144,9 +142,7 @@ def write_study(name: str, folder: Path) -> Path:
         subprocess.run(build, check=True, capture_output=True, cwd=ROOT)
         return model.with_suffix(".omoco")
     stem = {"sliding": "sliding-100", "pendulum": "pendulum-50", "walking": "track"}[name]
-    file = folder / f"{name}.omoco"
-    file.write_bytes(gzip.decompress((MOCO / f"{stem}.omoco.gz").read_bytes()))
-    return file
+    return unpack_file(MOCO / f"{stem}.omoco.gz", folder / f"{name}.omoco")
 
 
 if __name__ == "__main__":

@@ -15,14 +15,14 @@ from __future__ import annotations
 
 import json
 import statistics
-import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+from _pair import measure_time, run_script
 from osimlite.mechanics.kernels.walks import PROGRESS
 from osimlite.models.walking import write_scenario
 from osimlite.studies.reflexes.scenario import Scenario
@@ -77,17 +77,17 @@ def main(file: Path, seconds: float) -> None:
     evaluations = int(scenario.get_walkers(1).progress[0, PROGRESS.FORCES])
     # Prepare the walkers of all candidates, so that this is not timed.
     scenario.walk(best, CANDIDATES, duration=0.1)
+    walk_alone = partial(scenario.walk, best, duration=seconds)
+    walk_together = partial(scenario.walk, best, CANDIDATES, duration=seconds)
     single_times = []
     candidate_times = []
     opensim_times = []
     with tempfile.TemporaryDirectory() as folder:
         walk_file = write_walk(Path(folder), scenario, walk)
         for _ in range(ROUNDS):
-            single_times.append(measure(lambda: scenario.walk(best, duration=seconds)))
-            candidate_times.append(
-                measure(lambda: scenario.walk(best, CANDIDATES, duration=seconds))
-            )
-            opensim_times.append(measure_opensim(walk_file))
+            single_times.append(measure_time(walk_alone, time.process_time))
+            candidate_times.append(measure_time(walk_together, time.process_time))
+            opensim_times.append(float(run_script(OPENSIM_SCRIPT, str(walk_file))))
     # A walk ends early if the walker falls.
     duration = walk.times[0]
     speed = walk.report["speed"][0]
@@ -135,25 +135,6 @@ def write_walk(folder: Path, scenario: Scenario, walk: Any) -> Path:
     file = folder / "walk.json"
     file.write_text(json.dumps(content))
     return file
-
-
-def measure(work: Callable[[], object]) -> float:
-    """Return the processor time of a function (s)."""
-    before = time.process_time()
-    work()
-    return time.process_time() - before
-
-
-def measure_opensim(walk_file: Path) -> float:
-    """Return the processor time (s) in which OpenSim integrates a walk."""
-    done = subprocess.run(
-        [sys.executable, "-c", OPENSIM_SCRIPT, str(walk_file)],
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    # OpenSim may print messages before the time.
-    return float(done.stdout.split()[-1])
 
 
 if __name__ == "__main__":

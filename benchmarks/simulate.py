@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import opensim
@@ -23,10 +22,9 @@ from rich.console import Console
 from rich.table import Table
 
 import osimlite
+from _corpus import WALKER
 from _pair import Pair, print_pairs, time_pair
 from osimlite.simulation import Simulation
-
-MODEL = Path(__file__).resolve().parent.parent / "fixtures" / "walker" / "DynamicWalkerModel.osim"
 
 TO = 2.0
 """End of the simulation (s)."""
@@ -61,11 +59,11 @@ manager.integrate({to})
 
 def main() -> None:
     opensim.Logger.setLevelString("off")
-    model = opensim.Model(str(MODEL))
+    model = opensim.Model(str(WALKER))
     model.initSystem()
     console = Console()
     simulations = {
-        name: Simulation(osimlite.read(MODEL), engine) for name, engine in ENGINES.items()
+        name: Simulation(osimlite.read(WALKER), engine) for name, engine in ENGINES.items()
     }
     # All programs converge to the same motion, so that one of them can provide the reference.
     exact = prepare_osimlite_runs(simulations["compiled"], REFERENCE_ACCURACY)()

@@ -37,13 +37,12 @@ from rich.console import Console
 from rich.table import Table
 
 import osimlite
-from _pair import print_pairs, time_pair
+from _corpus import WALKER
+from _pair import measure_time, print_pairs, time_pair
 from osimlite.studies.sweep.plan import Plan, plan
 from osimlite.studies.sweep.run import sweep
 from osimlite.studies.sweep.runner import Runner
 from osimlite.studies.sweep.sampling import choose_samples
-
-MODEL = Path(__file__).resolve().parent.parent / "fixtures" / "walker" / "DynamicWalkerModel.osim"
 
 START_RANGES = {"RHip_rz": "20deg:40deg", "LHip_rz": "-20deg:0deg", "Pelvis_tx/speed": "0:1"}
 """Variables of the start and their ranges."""
@@ -81,7 +80,7 @@ def main() -> None:
         if "--many" in sys.argv:
             console.print(measure_many_walkers(path))
             return
-        starts = plan(osimlite.read(MODEL), START_RANGES, to=TO)
+        starts = plan(osimlite.read(WALKER), START_RANGES, to=TO)
         warm_up(Runner(starts))
         console.print(compare_workers(starts, path))
         if "--workers" in sys.argv:
@@ -150,7 +149,7 @@ def prepare_opensim_runs(opensim: Any, rows: Any) -> Callable[[], list[float]]:
         rows: angles of the hips (rad) and speed of the pelvis (m/s) of each walker (walkers, 3).
     """
     # Model and state are made once, as in OpenSim's examples.
-    model = opensim.Model(str(MODEL))
+    model = opensim.Model(str(WALKER))
     state = model.initSystem()
     coordinates = model.getCoordinateSet()
     right_hip = coordinates.get("RHip_rz")
@@ -195,7 +194,7 @@ def compare_workers(sweep_plan: Plan, path: Path) -> Table:
             separate_rates.append([measure_rate(count) for count in (1, 2)])
             sweep_rates.append(
                 [
-                    WALKERS / measure_seconds(prepare_sweep(sweep_plan, path, workers=count))
+                    WALKERS / measure_time(prepare_sweep(sweep_plan, path, workers=count))
                     for count in (1, 2)
                 ]
             )
@@ -214,13 +213,6 @@ def compare_workers(sweep_plan: Plan, path: Path) -> Table:
             f"{max(gains):.2f}",
         )
     return table
-
-
-def measure_seconds(work: Callable[[], object]) -> float:
-    """Return the wall-clock time of a function (s)."""
-    started = time.perf_counter()
-    work()
-    return time.perf_counter() - started
 
 
 @contextmanager
@@ -276,7 +268,7 @@ def serve_walkers(packed_plan: bytes, end: Any) -> None:
     end.send(0.0)
     while count := end.recv():
         rows = choose_samples(sweep_plan.variables, "sobol", count).make_block(0, count)
-        end.send(measure_seconds(partial(runner.run, rows)))
+        end.send(measure_time(partial(runner.run, rows)))
 
 
 def compare_variables() -> Table:
@@ -290,7 +282,7 @@ def compare_variables() -> Table:
         ("starts and a mass", MASS_RANGES, WALKERS, "compiled"),
         ("starts, PyBullet", START_RANGES, BULLET_WALKERS, "bullet"),
     ):
-        sweep_plan = plan(osimlite.read(MODEL), ranges, to=TO, engine=engine)
+        sweep_plan = plan(osimlite.read(WALKER), ranges, to=TO, engine=engine)
         runner = Runner(sweep_plan)
         rows = choose_samples(sweep_plan.variables, "sobol", count).make_block(0, count)
         # The first rows are the warm-up.
@@ -307,7 +299,7 @@ def measure_many_walkers(path: Path) -> Table:
     table = Table(title=f"{MANY_WALKERS} walkers")
     for heading in ("runs", "memory, MB", "seconds"):
         table.add_column(heading, justify="right")
-    sweep_plan = plan(osimlite.read(MODEL), START_RANGES, to=TO)
+    sweep_plan = plan(osimlite.read(WALKER), START_RANGES, to=TO)
     started = time.perf_counter()
     # If memory grew with the number of runs, these rows would show it.
     marks = [int(MANY_WALKERS * fraction) for fraction in (0.01, 0.1, 0.25, 0.5, 0.75, 1.0)]

@@ -11,7 +11,6 @@ process: with no cache, and with all files unchanged.
 from __future__ import annotations
 
 import argparse
-import os
 import subprocess
 import sys
 import tempfile
@@ -26,6 +25,8 @@ from typing import NamedTuple
 
 from rich.console import Console
 from rich.table import Table
+
+from _pair import copy_user_environment
 
 
 class Format(NamedTuple):
@@ -175,11 +176,7 @@ def write_tables(folder: Path, size: int) -> tuple[int, int]:
 def measure_validation(folder: Path) -> Usage:
     """Run `osimlite validate` on a folder, with a cache in that folder."""
     command = [sys.executable, "-m", "osimlite", "validate", str(folder), "--format", "concise"]
-    # With this variable Python compiles every module again, which users do not have.
-    environment = {
-        name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"
-    }
-    environment["XDG_CACHE_HOME"] = str(folder / ".cache")
+    environment = copy_user_environment() | {"XDG_CACHE_HOME": str(folder / ".cache")}
     start = time.perf_counter()
     done = subprocess.run(
         [sys.executable, "-c", MEASURE_SCRIPT, *command],

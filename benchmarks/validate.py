@@ -14,7 +14,6 @@ uses cached findings. Complete processes of single models are timed by all.py.
 from __future__ import annotations
 
 import argparse
-import os
 import subprocess
 import sys
 import tempfile
@@ -26,7 +25,7 @@ from rich.console import Console
 from rich.table import Table
 
 from _corpus import CORPUS, unpack_models
-from _pair import Pair, print_pairs, time_pair
+from _pair import Pair, copy_user_environment, print_pairs, time_pair
 
 ROOT = Path(__file__).resolve().parents[1]
 WALKER = ROOT / "fixtures" / "walker" / "DynamicWalkerModel.osim"
@@ -157,14 +156,10 @@ def measure_validation(folder: Path) -> tuple[float, float]:
         Time (s), and peak memory of the largest process (MB).
     """
     command = [sys.executable, "-m", "osimlite", "validate", str(folder), "--format", "concise"]
-    # With this variable Python compiles every module again, which users do not have.
-    environment = {
-        name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"
-    }
     start = time.perf_counter()
     done = subprocess.run(
         [sys.executable, "-c", MEMORY_SCRIPT, *command],
-        env=environment,
+        env=copy_user_environment(),
         capture_output=True,
         text=True,
         check=True,

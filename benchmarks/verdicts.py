@@ -24,6 +24,7 @@ import json
 import math
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -35,7 +36,7 @@ from itertools import chain, combinations
 from pathlib import Path
 from typing import Any, NamedTuple, TextIO
 
-ROOT = Path(__file__).resolve().parents[1]
+from _corpus import ROOT, WALKER
 
 TIME_LIMIT = 20
 """Time that OpenSim has for one model (s)."""
@@ -224,8 +225,6 @@ def read_models(shared: Path, folder: Path, names: Sequence[str] = ()) -> list[P
     Returns:
         Files of the copies.
     """
-    import shutil
-
     result = []
     judge = Judge()
     for source in sorted((shared / "corpus" / "models").glob("*/*.osim")):
@@ -281,7 +280,7 @@ def edit_models(
         draw: source of random numbers.
 
     Yields:
-        Trials; less than `pairs` if some edits cannot be combined.
+        Trials; fewer with two edits than `pairs` if some edits cannot be combined.
     """
     paths = [*texts]
     for number in range(singles + pairs):
@@ -515,7 +514,7 @@ def main() -> None:
             models = read_models(options.shared, folder, options.models)
         texts = {path: path.read_text(encoding="utf-8", errors="replace") for path in models}
         walker = folder / "walker.osim"
-        walker.write_bytes((ROOT / "fixtures/walker/DynamicWalkerModel.osim").read_bytes())
+        shutil.copy(WALKER, walker)
         comparison = VerdictComparison(linters, [*models, walker], log)
         stack.callback(comparison.close)
         # The same seed gives the same trials, also with another version of the linter.
