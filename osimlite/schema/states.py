@@ -68,9 +68,9 @@ def list_motions(joint: Joint) -> dict[str, MotionType]:
     result: dict[str, MotionType] = dict.fromkeys(names, "coupled")
     transform: Any = getattr(joint, "spatial_transform", None)
     for axis_name, axis in transform.axes().items() if transform is not None else ():
-        if (
-            type(axis.function).__name__ == "LinearFunction"
-            and abs(axis.function.coefficients[0]) == 1.0
+        if type(axis.function).__name__ == "LinearFunction" and axis.function.coefficients[:1] in (
+            (1.0,),
+            (-1.0,),
         ):
             result |= dict.fromkeys(
                 axis.names, "rotational" if axis_name.startswith("r") else "translational"

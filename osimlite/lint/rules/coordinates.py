@@ -29,6 +29,7 @@ from osimlite.schema.splines import (
     PiecewiseLinearFunction,
     SimmSpline,
 )
+from osimlite.schema.states import list_motions
 
 ANGLE = Threshold(
     "largest-angle",
@@ -197,7 +198,8 @@ def report_degrees_for_radians(subject: Subject, report: FindingCollector) -> No
     """An angle seems to be in degrees.
 
     Reports rotational coordinates whose default value or range, read in radians, is beyond five
-    turns. Also reports frames, surfaces and wrap objects that are rotated by more than one turn.
+    turns. A coordinate of a CustomJoint is rotational if it drives a rotation by a linear function
+    with a slope of 1 or -1. Also reports frames, surfaces and wrap objects that are rotated by more than one turn.
 
     OpenSim reads these angles in radians, in which 90 is more than fourteen turns. (Only the limits
     of a CoordinateLimitForce are in degrees.)
@@ -213,9 +215,11 @@ def report_degrees_for_radians(subject: Subject, report: FindingCollector) -> No
     """
     max_angle, unbounded = subject.config.value_of(ANGLE), subject.config.value_of(UNBOUNDED)
     for joint in subject.find_instances(Joint):
-        # Joints whose coordinates have no fixed meaning are left out.
-        for coordinate, motion in zip(joint.coordinates, joint.motion_types or (), strict=False):
-            if motion != "rotational" or not isinstance(coordinate, Coordinate):
+        motions = list_motions(joint)
+        for coordinate in joint.coordinates:
+            if motions.get(coordinate.name) != "rotational" or not isinstance(
+                coordinate, Coordinate
+            ):
                 continue
             largest = max(
                 (abs(bound) for bound in coordinate.range if math.isfinite(bound)), default=0.0
