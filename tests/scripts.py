@@ -140,10 +140,24 @@ def _start_server(modules: tuple[str, ...], options: tuple[str, ...]) -> tuple[A
         bufsize=1,
         pass_fds=numbers,
         cwd=ROOT,
-        env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+        env={**_get_blas_kernels(), **os.environ, "OPENBLAS_NUM_THREADS": "1"},
     )
     atexit.register(_stop, server, files)
     return server, files
+
+
+def _get_blas_kernels() -> dict[str, str]:
+    """Return the variable that makes OpenBLAS use the same kernels on each processor that has AVX2.
+
+    By default OpenBLAS picks kernels by the processor, and the last digits of results differ. The
+    optimizer of OpenSim's CMCTool converged with those for Haswell (also used for AMD's Zen), and
+    failed with those for newer Intel processors on the same input.
+    """
+    try:
+        has_avx2 = " avx2 " in Path("/proc/cpuinfo").read_text()
+    except OSError:
+        has_avx2 = False
+    return {"OPENBLAS_CORETYPE": "Haswell"} if has_avx2 else {}
 
 
 def _stop(server: Any, files: list[Any]) -> None:

@@ -133,10 +133,10 @@ def test_a_static_trial_of_one_frame(tmp_path: Path, times: str) -> None:
     change(folder / "scale.xml", ("<time_range> 0 1<", f"<time_range>{times}<"))
     report = osimlite.validate(folder / "scale.xml")
     (error,) = [finding for finding in report.errors if finding.code == "OSIM85312"]
-    assert times == "0.517 0.517" or "repeat the row" in error.message
+    assert times == "0.517 0.517" or "add a copy of the row" in error.message
     with pytest.raises(osimlite.OsimliteError) as refusal:
         osimlite.run(folder / "scale.xml", folder / "out", check=False)
-    assert "repeat the row" in str(refusal.value)
+    assert "add a copy of the row" in str(refusal.value)
 
 
 PATHS = ["/jointset/{0}/{1}/value", "{0}/{1}/value", "/jointset/{0}/{1}"]

@@ -221,7 +221,7 @@ def test_what_has_no_meaning_is_refused(model, tmp_path) -> None:
     (tmp_path / "first" / "controller.sto").unlink()
     for words, choices in (
         (
-            "after its start at 0.1 s, not 0.05",
+            r"later than its start, 0\.1 s, found 0\.05 s",
             {"to": 0.05, "resume": first, "controller": feedback},
         ),
         ("the earlier run had a controller; pass", {"resume": first}),
