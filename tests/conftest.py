@@ -15,6 +15,7 @@ from hypothesis import settings
 from osimlite.schema.model import Model
 from tests import separate
 from tests.bare import BareEnvironment
+from tests.search_paths import restore_search_paths
 from tests.simple_models import read_walker
 from tests.suite import Suite
 
@@ -31,12 +32,6 @@ ROUNDED = {"m0079": 1e-6, "m0109": 1e-7, "m0168": 1e-7, "m0172": 1e-8}
 
 All other models have a tolerance of 1e-10.
 """
-
-LIBRARY_PATHS = {
-    name: os.environ.get(name)
-    for name in ("PATH", "LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH", "SIMBODY_HOME")
-}
-"""Values of the variables that an import of OpenSim changes, before that import."""
 
 # No deadline: a busy machine must not fail a property. In CI, a property must fail the same way
 # twice.
@@ -127,17 +122,12 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup() -> None:
-    """Remove OpenSim's folder from the search paths of programs and libraries, where its import adds it.
+    """Restore the search paths of programs and libraries, which OpenSim's import changes.
 
-    Processes that tests start would otherwise load OpenSim's CasADi instead of the installed one.
     tests/oracle/conftest.py does the same while tests are collected, before workers inherit these
     variables.
     """
-    for name, value in LIBRARY_PATHS.items():
-        if value is None:
-            os.environ.pop(name, None)
-        else:
-            os.environ[name] = value
+    restore_search_paths()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -23,6 +23,8 @@ from typing import Any
 
 import pytest
 
+from tests.search_paths import restore_search_paths
+
 ROOT = Path(__file__).resolve().parent.parent
 # Name of the plugin by which pytest in the server is recognized.
 _SERVER = "osimlite-check-server"
@@ -40,6 +42,8 @@ class CheckServer:
     def __init__(self, folder: Path) -> None:
         self.log = tempfile.TemporaryFile()  # noqa: SIM115
         paths = [str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
+        # A collected test module may have imported OpenSim.
+        restore_search_paths()
         # With the variables of pytest-xdist, pytest in the server would act as a worker.
         variables = {
             name: value for name, value in os.environ.items() if not name.startswith("PYTEST_XDIST")

@@ -89,3 +89,15 @@ def test_what_cannot_be_imported_is_an_error(project: pytest.Pytester) -> None:
     result = project.runpytest_subprocess()
     result.assert_outcomes(errors=1)
     result.stdout.fnmatch_lines(["*No module named 'no_such_module'*"])
+
+
+def test_the_server_has_the_search_paths_of_the_start(project: pytest.Pytester) -> None:
+    """A module that is collected earlier may import OpenSim, which changes the search paths."""
+    project.makepyfile(
+        a_module="import os\nos.environ['SIMBODY_HOME'] = 'changed'",
+        test_first="import a_module\ndef test_nothing(): pass",
+    )
+    project.mkdir("later").joinpath("check_paths.py").write_text(
+        "import os\ndef test_paths(): assert os.environ.get('SIMBODY_HOME') != 'changed'"
+    )
+    project.runpytest_subprocess("test_first.py", "later").assert_outcomes(passed=2)
