@@ -73,8 +73,7 @@ class Setup(Subject):
     def is_for(self, rule: Rule) -> bool:
         """Return whether a rule applies: rules on text, tags and values apply to every document."""
         if rule.code == "OSIM004":
-            # Setups of every version are read, but not those without one.
-            return bool(self.faults)
+            return True
         if rule.name == "included-file":
             return self.top is not None
         if rule.about == "model":

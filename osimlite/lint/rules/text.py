@@ -205,6 +205,23 @@ def report_document_version(subject: Subject, report: FindingCollector) -> None:
         if isinstance(fault, VersionError):
             suggested_version = None if fault.version is not None else str(CURRENT_VERSION)
             report(fault.message, number=0, attribute="Version", suggestion=suggested_version)
+    if subject.version is not None and subject.version > CURRENT_VERSION:
+        report(
+            f"version {subject.version} is newer than {CURRENT_VERSION}, the format of OpenSim "
+            "4.6: OpenSim ignores newer content without a message",
+            number=0,
+            attribute="Version",
+            severity=WARNING,
+            suggestion=str(CURRENT_VERSION),
+        )
+    # OpenSim reads setups of every older version.
+    if subject.about == "model":
+        _report_old_version(subject, report)
+
+
+def _report_old_version(subject: Subject, report: FindingCollector) -> None:
+    """Report a version of a model that OpenSim rejects, or that is too old for its sockets."""
+    assert subject.source is not None
     spans = subject.source.spans
     # A bare <Model> is read by OpenSim as a document without a version.
     has_root = bool(spans) and spans[0].tag != "Model"
@@ -235,15 +252,6 @@ def report_document_version(subject: Subject, report: FindingCollector) -> None:
             "OpenSim reads the document by the rules of the old format and does not find this element",
             number=0,
             attribute="Version",
-            suggestion=str(CURRENT_VERSION),
-        )
-    if subject.version is not None and subject.version > CURRENT_VERSION:
-        report(
-            f"version {subject.version} is newer than {CURRENT_VERSION}, the format of OpenSim "
-            "4.6: OpenSim ignores newer content without a message",
-            number=0,
-            attribute="Version",
-            severity=WARNING,
             suggestion=str(CURRENT_VERSION),
         )
 
