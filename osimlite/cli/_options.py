@@ -68,7 +68,7 @@ LastFrame = Annotated[
     ),
 ]
 Mass = Annotated[
-    float,
+    float | None,
     Option(
         "--mass",
         metavar="KG",
@@ -300,19 +300,22 @@ def choose_output_folder(file: Path, output: Path | None) -> Path:
     return Path(file.stem)
 
 
-def check_mass(mass: float) -> None:
-    """Check the mass of a subject in kg; -1, the default, scales masses with the volumes.
+def resolve_mass(mass: float | None) -> float:
+    """Return the mass of a subject for the fitting functions: -1 if the option is absent.
 
     Args:
-        mass: mass of the subject, kg.
+        mass: mass of the subject, kg; None if the option is absent.
 
     Raises:
         SettingError: the mass is not positive.
     """
     from osimlite.errors import SettingError
 
-    if mass != -1.0 and not mass > 0.0:
+    if mass is None:
+        return -1.0
+    if not mass > 0.0:
         raise SettingError(f"--mass: expected a positive mass in kg, found {mass:g}")
+    return mass
 
 
 def parse_named_words(

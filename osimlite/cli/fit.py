@@ -46,7 +46,7 @@ def fit(
     frames: Annotated[
         int, Option("--frames", metavar="COUNT", help="Number of frames to use, over all trials.")
     ] = 200,
-    mass: options.Mass = -1.0,
+    mass: options.Mass = None,
     output: options.Folder = None,
 ) -> None:
     """Fit a model to a person: compute segment sizes and marker positions from recorded movements.
@@ -65,7 +65,7 @@ def fit(
     from osimlite.fitting.person_files import create_person_files
     from osimlite.io.document.reader import read
 
-    options.check_mass(mass)
+    subject_mass = options.resolve_mass(mass)
     with progress_bar("fitting", None):
         person = fitted(
             read(file),
@@ -76,10 +76,10 @@ def fit(
             by_axis=by_axis,
             symmetric=not sides,
             frames=frames,
-            mass=mass,
+            mass=subject_mass,
         )
     folder = options.choose_output_folder(file, output)
-    texts = create_person_files(person, file, folder, mass)
+    texts = create_person_files(person, file, folder, subject_mass)
     make_folder(folder)
     for name, text in texts.items():
         write_atomically(folder / name, text)

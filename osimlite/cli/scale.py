@@ -33,7 +33,7 @@ def scale(
             help="Scale a body by a number, or one for each axis.",
         ),
     ] = None,
-    mass: options.Mass = -1.0,
+    mass: options.Mass = None,
     preserve: Annotated[
         bool, Option("--preserve-masses", help="Keep each body's share of the total mass.")
     ] = False,
@@ -85,8 +85,8 @@ def scale(
         for body, text in options.parse_named_words(factor, "--factor").items()
     }
     # Without any of these the model would be written unchanged.
-    options.check_mass(mass)
-    if not (measurements or factors or place or mass > 0.0):
+    subject_mass = options.resolve_mass(mass)
+    if not (measurements or factors or place or mass is not None):
         raise SettingError("there is nothing to scale; add --distance, --factor, --mass or --place")
     with progress_bar("scaling", None):
         model = read(file)
@@ -103,17 +103,19 @@ def scale(
             static,
             measurements=measurements,
             factors=factors,
-            mass=mass,
+            mass=subject_mass,
             preserve_mass_distribution=preserve,
             place=place,
             start=first,
             end=last,
         )
     assert result.measured is not None
+    # OpenSim's setups skip such a measurement. On a command line it is a mistake, and the body
+    # would keep its size.
+    for note in result.measured.notes:
+        raise SettingError(f"--distance: {note}")
     for name, ratio in result.measured.ratios.items():
         say(f"{name}: {ratio:.6g}")
-    for note in result.measured.notes:
-        say(f"left out: {note}")
     say(f"mass: {result.describe_mass()}")
     if result.placed is not None:
         for _, line in result.placed.describe_pose():

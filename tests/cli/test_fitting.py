@@ -76,6 +76,7 @@ def test_a_trial_is_fitted(lab: Path) -> None:
             ("scale", "box.osim", "walk.trc", "--distance", "b=one:twoo"),
             "--distance: 'box' has no marker 'twoo'; did you mean 'two'?",
         ),
+        (("scale", "box.osim", "--mass", "-1"), "--mass: expected a positive mass in kg, found -1"),
         (
             ("scale", "box.osim", "--factor", "b=0"),
             "expected positive factors of 'b', found 0, 0, 0",
@@ -93,6 +94,15 @@ def test_a_trial_is_fitted(lab: Path) -> None:
 def test_what_is_wrong_is_told(lab: Path, words: tuple[str, ...], said: str) -> None:
     done = run(*words, folder=lab)
     assert done.code in (1, 2) and said in done.err, done.err
+    assert sorted(path.name for path in lab.iterdir()) == ["box.osim", "walk.trc"]
+
+
+def test_a_measured_marker_that_is_missing_is_an_error(lab: Path) -> None:
+    """OpenSim's setups skip such a measurement; the command names it, and writes nothing."""
+    trial = lab / "walk.trc"
+    trial.write_text(trial.read_text().replace("two", "tow"))
+    done = run("scale", "box.osim", "walk.trc", "--distance", "b=one:two", folder=lab)
+    assert done.code == 2 and "the data have no marker 'two'; did you mean 'tow'?" in done.err
     assert sorted(path.name for path in lab.iterdir()) == ["box.osim", "walk.trc"]
 
 
