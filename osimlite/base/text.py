@@ -190,7 +190,7 @@ def suggest_path(name: str, paths: Collection[str]) -> str:
 
 
 def suggest_or_list(word: str, candidates: Iterable[str], *more_candidates: str) -> str:
-    """Return ``"; did you mean 'x'?"``, or ``"; there is x, y and z"`` if no known name is similar.
+    """Return ``"; did you mean 'x'?"``, or ``"; expected x, y or z"`` if no known name is similar.
 
     Args:
         word: unknown word.
@@ -198,7 +198,8 @@ def suggest_or_list(word: str, candidates: Iterable[str], *more_candidates: str)
         more_candidates: further texts to list.
     """
     names = list(candidates)
-    return suggest_name(word, names) or f"; there is {join_words([*names, *more_candidates])}"
+    accepted_words = join_words([*names, *more_candidates], conjunction="or")
+    return suggest_name(word, names) or (f"; expected {accepted_words}" if accepted_words else "")
 
 
 def format_range(low: float, high: float, form: str) -> str:
@@ -265,16 +266,17 @@ def make_unique_name(name: str, used_names: Container[str | None], first_number:
     )
 
 
-def join_words(words: Iterable[str], *, max_count: int = 8) -> str:
+def join_words(words: Iterable[str], *, max_count: int = 8, conjunction: str = "and") -> str:
     """Return words as ``"a, b and c"``; after the first `max_count` the number of the others.
 
     Args:
         words: words to join.
         max_count: largest number of words to list.
+        conjunction: word before the last one.
     """
     texts = list(words)
     if len(texts) > max_count:
         texts = [*texts[:max_count], f"{len(texts) - max_count} more"]
     if len(texts) < 2:
         return "".join(texts)
-    return f"{', '.join(texts[:-1])} and {texts[-1]}"
+    return f"{', '.join(texts[:-1])} {conjunction} {texts[-1]}"

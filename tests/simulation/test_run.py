@@ -130,7 +130,7 @@ def test_unknown_coordinate_names_the_nearest(walker):
         ({"to": "2"}, "number of seconds, not '2'"),
         ({"initial": {"swing": float("inf")}}, "give a number"),
         ({"engine": "bulet"}, r"did you mean 'bullet'\?$"),
-        ({"engine": "xyz"}, "there is bullet and compiled$"),
+        ({"engine": "xyz"}, "expected bullet or compiled$"),
         ({"route": "quick"}, "no route"),
     ],
 )

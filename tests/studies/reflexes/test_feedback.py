@@ -245,7 +245,7 @@ def test_what_has_no_meaning_is_refused(model, tmp_path) -> None:
             simulate(model, **{"to": 0.2, **choices})
     with pytest.raises(OsimliteError, match="other sensors or actuators"):
         simulate(finer, 0.2, controller=other, resume=first)
-    with pytest.raises(OsimliteError, match="no 'motor'; there is flexor and extensor"):
+    with pytest.raises(OsimliteError, match="no 'motor'; expected flexor or extensor"):
         simulate(finer, 0.2, controller=feedback)
 
 
