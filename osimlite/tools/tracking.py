@@ -224,9 +224,6 @@ class TrackingTasks:
                     raise job.create_error(
                         f"the task '{task.name}' of '{path}' has an empty '{property_name}'; set a value"
                     )
-            # As in OpenSim, `on` has no effect.
-            if not task.active[0]:
-                continue
             # The name of a task selects the desired motion, `coordinate` the coordinate that follows it.
             for property_name, name in (("name", task.name), ("coordinate", str(task.coordinate))):
                 if name not in names:
@@ -234,6 +231,9 @@ class TrackingTasks:
                         f"the {property_name} of the task '{task.name}' of '{path}' must be that of a "
                         f"coordinate; there is no coordinate '{name}'{suggest_name(name, names)}"
                     )
+            # As in OpenSim, `on` has no effect.
+            if not task.active[0]:
+                continue
             weight, kp, kv, ka = (
                 float(getattr(task, property_name)[0])
                 for property_name in ("weight", "kp", "kv", "ka")

@@ -180,3 +180,19 @@ def test_decimal_commas_of_a_time_range(tmp_path: Path, times: str, expected: st
     assert "OSIM205" not in report.codes
     (finding,) = [finding for finding in report if finding.code in ("OSIM201", "OSIM202")]
     assert finding.suggestion == expected
+
+
+@pytest.mark.parametrize("tag", ["on", "active"])
+def test_a_task_that_is_off_must_name_a_coordinate(tmp_path: Path, tag: str) -> None:
+    """OpenSim 4.6 looks up the name and the coordinate of each task, also of those that are off."""
+    folder = copy_lab("locked", tmp_path)
+    task = '<CMC_Joint name="hip_flexion"><on>true</on><weight>1</weight><active>true'
+    off = task.replace(f"<{tag}>true", f"<{tag}>false")
+    text = (folder / "t.xml").read_text()
+    assert task in text
+    (folder / "t.xml").write_text(text.replace(task, off.replace("hip_flexion", "hip_flexon")))
+    assert "'hip_flexon'" in codes(folder / "t.xml")["OSIM831"]
+    with pytest.raises(osimlite.OsimliteError, match="there is no coordinate 'hip_flexon'"):
+        osimlite.run(folder / "cmc.xml", folder / "out", check=False)
+    (folder / "t.xml").write_text(text.replace(task, off))
+    assert "OSIM831" not in codes(folder / "t.xml")

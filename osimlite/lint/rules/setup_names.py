@@ -65,7 +65,8 @@ def report_unknown_name(setup: Setup, report: FindingCollector) -> None:
     }
 
     def counts(item: Any) -> bool:
-        return (
+        # OpenSim looks up the coordinates of all tasks of RRA and CMC, also of those that are off.
+        return is_a(item, "TrackingTask") or (
             id(item) not in disabled_parts
             and vars(item).get("on", True)
             and vars(item).get("apply", True)

@@ -94,7 +94,12 @@ class CMC_Task(TrackingTask, abstract=True):
 
 
 class CMC_Joint(CMC_Task):
-    """Task to follow a coordinate."""
+    """Task to follow a coordinate.
+
+    The name selects the column of the desired motion, and must be that of a coordinate, too.
+    """
+
+    name_reference = Reference("coordinate-name", "Coordinate")
 
     wrt_body: Annotated[Named, _make_body_reference(consequence="ignored")] = ""
     express_body: Annotated[Named, _make_body_reference(consequence="ignored")] = ""
