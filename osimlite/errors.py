@@ -51,6 +51,10 @@ class UnitWarning(DoubtfulWarning):
     """Warning about a number without a unit that is probably not in rad."""
 
 
+class ResultWarning(DoubtfulWarning):
+    """Warning about the results of a tool that is also among the messages of its outcome."""
+
+
 class DeprecatedWarning(DoubtfulWarning, DeprecationWarning):
     """Warning that a name or an option will be removed; commands print it on standard error."""
 

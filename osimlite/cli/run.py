@@ -211,14 +211,17 @@ def _run_alone(
 ) -> Outcome:
     """Run a setup, print its messages, and return its outcome."""
     import sys
+    import warnings
 
     from osimlite.cli._console import complain, say
     from osimlite.cli._progress import progress_bar
-    from osimlite.errors import DocumentError
+    from osimlite.errors import DocumentError, ResultWarning
     from osimlite.lint.diagnostic import Report
     from osimlite.tools.running import FaultySetup
     from osimlite.tools.running import run as run_setup
 
+    # The summary of the outcome contains these warnings.
+    warnings.simplefilter("ignore", ResultWarning)
     try:
         with progress_bar("running", None) as advance:
             outcome = run_setup(

@@ -15,7 +15,7 @@ from osimlite.base.quantity import warn_caller
 from osimlite.base.records import dataclass, field, replace
 from osimlite.base.result_writing import ResultWriter
 from osimlite.base.text import format_count, join_words
-from osimlite.errors import DocumentError, SettingError, SimulationError
+from osimlite.errors import DocumentError, ResultWarning, SettingError, SimulationError
 from osimlite.io.tables.old_storage import PRECISION, format_old_table
 from osimlite.io.tables.storage import StoTable, format_adapter_table
 from osimlite.lint.diagnostic import Finding
@@ -134,14 +134,14 @@ class Outcome:
         self.messages.append((name, message))
 
     def add_warning(self, name: str, message: str) -> None:
-        """Add a message that makes the results doubtful, and print it on standard error.
+        """Add a message that makes the results doubtful, and issue it as a warning.
 
         Args:
             name: subject of the message, in one to three words.
             message: sentence for the user.
         """
         self.add_message(name, message)
-        warn_caller(message)
+        warn_caller(message, ResultWarning)
 
     def _note_missing(self, path: Path, table: StoTable) -> str:
         """Return a note about missing values of a table, and add a message; "" if none is missing.
