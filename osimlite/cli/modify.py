@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from osimlite.base.text import add_article
 from osimlite.cli._command import Argument, Option, command
+
+if TYPE_CHECKING:
+    from osimlite.schema.difference import Difference
 
 
 @command
@@ -66,12 +69,13 @@ def modify(
     from osimlite.fitting.modifying.words import find_change
     from osimlite.io.document.printer import write
     from osimlite.io.document.reader import read, read_any
+    from osimlite.schema.difference import find_differences
     from osimlite.schema.model import Model
     from osimlite.schema.tools.processors import ModelProcessor
 
     if source not in (None, "nimble"):
         raise SettingError(f"--from takes 'nimble', not '{source}'")
-    operators = []
+    changes = []
     for assignment in replace or ():
         name, equals, value = assignment.partition("=")
         if not equals:
@@ -79,10 +83,10 @@ def modify(
                 f"--replace takes NAME=WORD, such as muscles=degroote; got '{assignment}'"
             )
         # All words are checked before the model is read, which can take seconds.
-        operators.append(find_change(name, value))
+        changes.append((assignment, find_change(name, value)))
     top = read_any(file)
     if isinstance(top, Model):
-        if not operators and source is None:
+        if not changes and source is None:
             raise SettingError(
                 "there is nothing to replace; add --replace NAME=WORD, such as muscles=degroote"
             )
@@ -101,11 +105,13 @@ def modify(
         from osimlite.translate.nimble import convert_from_nimble
 
         rewritten = convert_from_nimble(model)
-    fitted = [
-        path_fit
-        for apply_change in operators
-        for path_fit in apply_change(model, file.parent) or ()
-    ]
+    fitted = []
+    summaries = []
+    for assignment, apply_change in changes:
+        before = model.copy_deep()
+        fitted += apply_change(model, file.parent) or []
+        summary = _summarize_differences(find_differences(before, model))
+        summaries.append(f"{assignment}: {summary}")
     target = output or file.with_name(f"{file.stem}_modified.osim")
     make_folder_of(target)
     write(model, target)
@@ -115,6 +121,8 @@ def modify(
         )
     if source == "nimble" and not rewritten:
         say("OpenSim moves this model as Nimble does; nothing was rewritten")
+    for summary in summaries:
+        say(summary)
     if fitted:
         table = create_table("Errors of the fitted polynomials")
         for heading in (
@@ -143,3 +151,33 @@ def modify(
             )
         print_table(table)
     say(f"{target}: {format_count(len(list(model.components())), 'component')}")
+
+
+def _summarize_differences(differences: list[Difference]) -> str:
+    """Return how many components a replacement changed, added and removed, by class."""
+    from collections import Counter
+
+    from osimlite.base.text import format_count, join_words
+
+    added: Counter[str] = Counter()
+    removed: Counter[str] = Counter()
+    new_classes: Counter[tuple[str, str]] = Counter()
+    changed_paths: dict[str, None] = {}
+    changed_properties: dict[str, None] = {}
+    for path, property_name, old, new in differences:
+        if property_name == "class":
+            new_classes[old, new] += 1
+        elif property_name:
+            changed_paths[path] = None
+            changed_properties[property_name] = None
+        elif old is None:
+            added[new] += 1
+        else:
+            removed[old] += 1
+    parts = [f"{count} {old} became {new}" for (old, new), count in new_classes.items()]
+    if changed_paths:
+        count_text = format_count(len(changed_paths), "component")
+        parts.append(f"{join_words(changed_properties, max_count=3)} of {count_text} changed")
+    parts += [f"{count} {name} added" for name, count in added.items()]
+    parts += [f"{count} {name} removed" for name, count in removed.items()]
+    return "; ".join(parts) or "nothing changed"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shutil import copy
 
 import numpy as np
 import pytest
@@ -127,3 +128,19 @@ def test_the_model_of_a_study_is_made(tmp_path: Path) -> None:
     assert done.code == 2 and "NAME=WORD" in done.err
     with pytest.raises(SettingError):
         modify(own, paths="straight")
+
+
+def test_the_command_says_what_each_replacement_changed(fixtures: Path, tmp_path: Path) -> None:
+    """A replacement without an effect is visible: rigid tendons are set twice."""
+    copy(fixtures / "labs" / "locked" / "leg.osim", tmp_path)
+    words = ("muscles=degroote", "tendon=rigid", "reserves=100", "tendon=rigid", "muscles=none")
+    options = [part for word in words for part in ("--replace", word)]
+    done = run("modify", "leg.osim", *options, folder=tmp_path)
+    assert (done.code, done.err) == (0, "")
+    assert done.out.splitlines()[:5] == [
+        "muscles=degroote: 4 Millard2012EquilibriumMuscle became DeGrooteFregly2016Muscle",
+        "tendon=rigid: ignore_tendon_compliance of 4 components changed",
+        "reserves=100: 4 CoordinateActuator added",
+        "tendon=rigid: nothing changed",
+        "muscles=none: 4 DeGrooteFregly2016Muscle removed",
+    ]
