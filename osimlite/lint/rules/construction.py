@@ -172,9 +172,11 @@ def report_impossible_force(subject: Subject, report: FindingCollector) -> None:
     doubtful = {item.component for item in report.findings if item.code == "OSIM207"}
     for obstacle in _select_unreported(subject, report, Stage.FORCE):
         item = subject.tree.by_path.get(obstacle.path)
-        if obstacle.path in doubtful or (item is not None and is_unused(subject, item)):
-            # OpenSim computes with numbers that make no sense, and never asks a force that is
-            # disabled; osimlite makes it for its states.
+        if obstacle.path in doubtful:
+            message = f"OpenSim accepts this number, osimlite does not: {obstacle.message}"
+            _report_obstacle(subject, report, obstacle, message, severity=WARNING)
+        elif item is not None and is_unused(subject, item):
+            # OpenSim never asks a force that is disabled; osimlite makes it for its states.
             message = f"osimlite cannot compute this, OpenSim can: {obstacle.message}"
             _report_obstacle(subject, report, obstacle, message, severity=WARNING)
         else:
