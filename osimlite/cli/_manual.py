@@ -47,6 +47,7 @@ PAGES = {
     "osimlite.io.b3d": "docs/addbiomechanics.md",
     "osimlite.io.bvh": "docs/animation.md",
     "osimlite.io.document": "docs/rules.md#text",
+    "osimlite.io.document.reader": "docs/errors.md#files",
     "osimlite.io.document.data": "docs/yaml.md",
     "osimlite.io.document.plugins": "docs/plugin-classes.md",
     "osimlite.base.files": "docs/errors.md#files",

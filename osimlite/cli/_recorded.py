@@ -58,10 +58,8 @@ def print_motion_summary(recorded: RecordedMotion, files: Iterable[Path]) -> Non
         recorded: motion that was read.
         files: paths of the written files.
     """
-    if recorded.missing:
-        say(f"not in the motion, default value used: {join_words(recorded.missing)}")
-    if recorded.ignored:
-        say(f"ignored columns, which are not coordinates: {join_words(recorded.ignored)}")
+    for sentence in recorded.describe_columns():
+        say(sentence)
     is_rotational = [info.motion_type == "rotational" for info in recorded.mechanism.coordinates]
     largest = abs(recorded.values[:, is_rotational]).max(initial=0.0)
     if largest > LARGEST_JOINT_ANGLE:

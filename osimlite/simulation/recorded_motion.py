@@ -6,7 +6,7 @@ InverseDynamicsTool.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
@@ -119,6 +119,20 @@ class RecordedMotion(Movement):
     ignored: tuple[str, ...] = ()
     around: tuple[Array, Array] | None = None
     named_by_path: tuple[str, ...] = ()
+
+    def describe_columns(self, computed: Collection[str] = ()) -> list[str]:
+        """Return sentences about coordinates without a column, and columns without a coordinate.
+
+        Args:
+            computed: coordinates that the caller computes from others where the record lacks them.
+        """
+        sentences = []
+        if missing := [name for name in self.missing if name not in computed]:
+            sentences.append(f"not in the motion, default value used: {join_words(missing)}")
+        if self.ignored:
+            names = join_words(self.ignored)
+            sentences.append(f"ignored columns, which are not coordinates: {names}")
+        return sentences
 
     @classmethod
     def from_source(

@@ -77,10 +77,10 @@ def read_recording(
     rows = recorded_motion.values
     for name, value in (values or {}).items():
         rows[:, mechanism.coordinate_index(name)] = value
-    _follow_couplers(mechanism, rows, set(recorded_motion.missing))
+    coupled_names = _follow_couplers(mechanism, rows, set(recorded_motion.missing))
     table = read_sto(path)
     speeds = _read_speeds(mechanism, table)
-    remarks = []
+    remarks = recorded_motion.describe_columns(coupled_names | set(values or {}))
     columns: Mapping[str, Array] = {}
     if forces is not None:
         columns = _find_columns(read_sto(forces), recorded_motion.times)
@@ -103,8 +103,12 @@ def read_recording(
     )
 
 
-def _follow_couplers(mechanism: Mechanism, rows: Array, missing_names: set[str]) -> None:
-    """Set coordinates that the file lacks, in place, by their couplers, which may form chains."""
+def _follow_couplers(mechanism: Mechanism, rows: Array, missing_names: set[str]) -> set[str]:
+    """Set coordinates that the file lacks, in place, by their couplers, which may form chains.
+
+    Returns:
+        Names of these coordinates.
+    """
     couplers = [
         constraint for constraint in mechanism.constraints if isinstance(constraint, Coupler)
     ]
@@ -117,6 +121,7 @@ def _follow_couplers(mechanism: Mechanism, rows: Array, missing_names: set[str])
     for coupler in couplers * len(couplers):
         arguments = list(coupler.independent)
         rows[:, coupler.dependent] = [coupler.function.evaluate(row[arguments])[0] for row in rows]
+    return {mechanism.coordinates[coupler.dependent].name for coupler in couplers}
 
 
 def compute_forces(

@@ -96,3 +96,21 @@ def test_the_page_is_served_until_interrupted(walker: Path) -> None:
             assert "Traceback" not in served.stderr.read()
         finally:
             served.kill()
+
+
+def test_columns_that_do_not_move_the_model_are_named(
+    fixtures: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lab = fixtures / "labs" / "locked"
+    text = (lab / "walk.mot").read_text()
+    (tmp_path / "walk.mot").write_text(text.replace("knee_angle", "kne_angle"))
+    page = str(tmp_path / "page.html")
+    assert run(str(lab / "leg.osim"), str(tmp_path / "walk.mot"), "--html", page) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[:2] == [
+        "not in the motion, default value used: knee_angle",
+        "ignored columns, which are not coordinates: kne_angle",
+    ]
+    (tmp_path / "walk.mot").write_text(text)
+    assert run(str(lab / "leg.osim"), str(tmp_path / "walk.mot"), "--html", page) == 0
+    assert capsys.readouterr().out.startswith("wrote ")
