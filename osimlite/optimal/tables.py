@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from osimlite.base.records import replace
+from osimlite.base.text import format_count
 from osimlite.errors import DocumentError
 from osimlite.fitting.marker_data import MarkerData
 from osimlite.io.tables.storage import StoTable, expect_increasing_times, read_sto
@@ -279,7 +280,10 @@ def check_columns(table: StoTable, columns: Sequence[str]) -> None:
         DocumentError: a column is missing or has gaps, or the times are too few or do not rise.
     """
     if len(table.times) < MIN_SPLINE_TIMES:
-        message = f"the table has {len(table.times)} times; splines of fifth degree need at least {MIN_SPLINE_TIMES}"
+        message = (
+            f"the table has {format_count(len(table.times), 'time')}; splines of fifth degree need at "
+            f"least {MIN_SPLINE_TIMES}"
+        )
         raise DocumentError(message, file=table.file)
     expect_increasing_times(table.times, table.file)
     for name in columns:

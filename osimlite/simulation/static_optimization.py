@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from osimlite.base.progress import divide_rows
-from osimlite.base.text import join_words, suggest_or_list
+from osimlite.base.text import format_count, join_words, suggest_or_list
 from osimlite.errors import ModelError, SettingError, UnsupportedError
 from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.kernels.effort import effort_size
@@ -128,8 +128,8 @@ class StaticOptimization:
         # Fewer unknowns than equations have no solution but by chance.
         if len(self.names) < len(self.coordinates) and not underactuated:
             raise ModelError(
-                f"'{model.name}' has {len(self.names)} actuators for {len(self.coordinates)} coordinates; append "
-                "reserve actuators, or lock coordinates"
+                f"'{model.name}' has {format_count(len(self.names), 'actuator')} for "
+                f"{format_count(len(self.coordinates), 'coordinate')}; append reserve actuators, or lock coordinates"
             )
         self._bounds = np.array(
             [(item.min_control, item.max_control) for item in self._actuators], dtype=float

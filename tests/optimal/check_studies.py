@@ -297,7 +297,7 @@ def test_frames_that_are_not_told(kind, given, said, tmp_path):
         ("", (), "expression is required"),
         ("2*m", (), "expression is '2\\*m': .*'m'"),
         ("1+", (), "expression is '1\\+'"),
-        ("m", ("m",), "0 parameters and 1 variables"),
+        ("m", ("m",), "0 parameters and 1 variable;"),
     ],
 )
 def test_expressions_that_are_none(expression, variables, said, tmp_path):

@@ -262,7 +262,7 @@ def test_fewer_actuators_than_coordinates(tmp_path: Path, setup: str) -> None:
     ran, log = run_opensim(folder / setup, folder / "theirs")
     assert not ran
     assert "over-constrained" in log
-    with pytest.raises(osimlite.OsimliteError, match="1 actuators for 2 coordinates"):
+    with pytest.raises(osimlite.OsimliteError, match="1 actuator for 2 coordinates"):
         osimlite.run(folder / setup, folder / "ours")
 
 

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
-from osimlite.base.text import join_words
+from osimlite.base.text import format_count, join_words
 from osimlite.lint.registry import ERROR, WARNING, FindingCollector, rule
 from osimlite.lint.setup import Setup, names_file, select_members
 from osimlite.lint.words import describe_object, find_nearest_name
@@ -329,8 +329,8 @@ def report_tool_setting(setup: Setup, report: FindingCollector) -> None:
             if len(analysis.apply_on_bodies) not in (0, 1, len(analysis.joint_names)):
                 # OpenSim takes none, one word for all joints, or one word for each.
                 report(
-                    f"apply_on_bodies has {len(analysis.apply_on_bodies)} words for {len(analysis.joint_names)} "
-                    "joints: OpenSim rejects it",
+                    f"apply_on_bodies has {format_count(len(analysis.apply_on_bodies), 'word')} for "
+                    f"{format_count(len(analysis.joint_names), 'joint')}: OpenSim rejects it",
                     analysis,
                     tag="apply_on_bodies",
                     fault="reaction-count",

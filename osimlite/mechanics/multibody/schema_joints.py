@@ -7,7 +7,13 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from osimlite.base.text import SAME_CLASS_SIMILARITY, add_article, join_words, suggest_name
+from osimlite.base.text import (
+    SAME_CLASS_SIMILARITY,
+    add_article,
+    format_count,
+    join_words,
+    suggest_name,
+)
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.mechanics.multibody.joints import (
     PLAIN_JOINTS,
@@ -89,7 +95,7 @@ def joint_motions(
     needed = 1 + max((index for motion in motions for index in motion.coordinates), default=-1)
     if len(coordinates) != needed:
         raise ModelError(
-            f"{class_name} '{path}' has {len(coordinates)} coordinates, but needs {needed}"
+            f"{class_name} '{path}' has {format_count(len(coordinates), 'coordinate')}, but needs {needed}"
         )
     return motions, coordinates
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from osimlite.base.text import format_count
 from osimlite.derivatives.symbolic import make_symbolic
 from osimlite.derivatives.symbols import RecordedVector, casadi
 from osimlite.errors import ModelError, SettingError
@@ -182,7 +183,9 @@ def build_expression_based_parameter_goal(
         raise problem.invalid_error(goal, "expression is required")
     if len(goal.variables) != len(goal.parameters):
         raise problem.invalid_error(
-            goal, f"it has {len(goal.parameters)} parameters and {len(goal.variables)} variables"
+            goal,
+            f"it has {format_count(len(goal.parameters), 'parameter')} and "
+            f"{format_count(len(goal.variables), 'variable')}; it needs one variable for each",
         )
     try:
         formula = expressions.Formula.parse(goal.expression, goal.variables, "expression")

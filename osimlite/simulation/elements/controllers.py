@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from osimlite.base.text import suggest_name
+from osimlite.base.text import format_count, suggest_name
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.io.tables.storage import find_named_file
 from osimlite.schema.controller_types import PrescribedController
@@ -35,7 +35,8 @@ def drive_as_prescribed(
     actuators = find_actuators(builder, controller)
     if len(functions) != len(actuators):
         raise ModelError(
-            f"'{path}' has {len(functions)} functions for {len(actuators)} actuators; give it one for each"
+            f"'{path}' has {format_count(len(functions), 'function')} for "
+            f"{format_count(len(actuators), 'actuator')}; give it one for each"
         )
     for actuator, function in zip(actuators, functions, strict=True):
         try:

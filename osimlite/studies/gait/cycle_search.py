@@ -198,8 +198,8 @@ class CycleSearch:
         self.footing: FootContacts = find_footing(engine, feet)
         if len(self.footing.feet) != 2:
             raise SettingError(
-                f"the search for cycles needs two feet; "
-                f"'{engine.mechanism.name}' has {len(self.footing.feet)}; name two with --feet"
+                f"the search for cycles needs two feet, but '{engine.mechanism.name}' has "
+                f"{len(self.footing.feet)}; name two with --feet"
             )
         self._first: StepMap | None = None
 

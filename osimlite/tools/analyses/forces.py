@@ -114,7 +114,7 @@ def _expand_words(
     if len(words) != len(joints):
         count = format_count(len(joints), "joint")
         raise tables.job.create_error(
-            f"{property_name} has {len(words)} words for {count}; write one word, or one for each joint"
+            f"{property_name} has {format_count(len(words), 'word')} for {count}; write one word, or one for each joint"
         )
     return words
 
