@@ -129,5 +129,5 @@ def _convert_roles(text: str) -> str:
 
 
 def _format_cell(text: str) -> str:
-    """Return a text as the cell of a table: one line, without bars."""
+    """Return a text as the cell of a table: one line with escaped bars."""
     return _convert_roles(" ".join(text.split())).replace("|", "\\|")

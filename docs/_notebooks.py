@@ -175,7 +175,7 @@ def convert_cells(path: Path, notebook: Any) -> Iterator[str]:
                 _outputs[key] = f"<div>{html}</div>"
                 yield key
         if number == 0:
-            yield (f"This page is [a notebook]({path.name}), executed when the manual was built.")
+            yield f"This page is [a notebook]({path.name}), executed when the manual was built."
     if not any(cell.get("outputs") for cell in notebook.cells):
         needed = notebook.metadata.get("needs", [])
         reason = f", since it needs {', '.join(needed)}" if needed else ""
