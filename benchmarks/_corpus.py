@@ -23,6 +23,9 @@ CORPUS = ROOT.parent / "shared" / "corpus" / "converted"
 REFERENCE = ROOT.parent / "shared" / "oracle" / "tools" / "reference"
 """Folder of setups and results of OpenSim's tools; many files are compressed."""
 
+MOCO = ROOT.parent / "shared" / "oracle" / "moco"
+"""Folder of studies, with the solutions of Moco."""
+
 
 def unpack_file(source: Path, target: Path) -> Path:
     """Copy a file, and decompress it if its name ends with ``.gz``.

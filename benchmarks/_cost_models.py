@@ -2,7 +2,7 @@
 
 The walker is a file of the repository, the legs are the built-in jumper. The human is built here.
 It is as large as the largest models in everyday use: 39 coordinates, splines in the knees, a
-coupled patella at each knee, and wrap surfaces. Its sizes are plausible.
+coupled patella at each knee, and wrap surfaces. Its dimensions are invented, but plausible.
 """
 
 from __future__ import annotations

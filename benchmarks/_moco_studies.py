@@ -20,13 +20,10 @@ from typing import Any
 import numpy as np
 
 import osimlite
-from _corpus import unpack_file
+from _corpus import MOCO, ROOT, unpack_file
 from osimlite.io.tables.writers import write_trc
 
-MOCO = Path(__file__).resolve().parents[2] / "shared/oracle/moco"
-"""Folder of studies, with the solutions of Moco."""
-
-CORE = Path(__file__).resolve().parents[2] / "pub-opensim-core"
+CORE = ROOT.parent / "pub-opensim-core"
 """Default folder of the sources of opensim-core, or a git directory of them."""
 
 WALKING_3D = "OpenSim/Examples/Moco/example3DWalking"

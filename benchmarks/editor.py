@@ -2,7 +2,7 @@
 
     python benchmarks/editor.py [--kilobytes 870] [--keystrokes 20]
 
-A real client starts the server as an editor does, and opens a walker with many markers and springs.
+A real client starts the server as an editor does, and opens a walker with a spring and many markers.
 Each keystroke inserts a letter into the name of a contact geometry, or deletes it again. The time
 runs from the moment at which the change is sent to the moment at which the findings arrive. The
 script prints the median and the longest time; it stops if the wrong text is underlined. OpenSim has

@@ -21,10 +21,9 @@ import tempfile
 from pathlib import Path
 from typing import NamedTuple
 
-from _corpus import ROOT, unpack_file
+from _corpus import MOCO, ROOT, unpack_file
 from _pair import run_script
 
-MOCO = ROOT.parent / "shared/oracle/moco"
 WALKING_EXAMPLE = ROOT.parent / "pub-opensim-core/OpenSim/Examples/Moco/example2DWalking"
 
 

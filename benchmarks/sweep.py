@@ -94,7 +94,7 @@ def warm_up(runner: Runner) -> None:
 
 
 def compare_with_opensim(starts: Plan, path: Path, console: Console) -> None:
-    """Print the times and the differences of the distances.
+    """Print the times, the cost of each kind of variable, and the differences of the distances.
 
     Args:
         starts: plan of the sweep.

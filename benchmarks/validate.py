@@ -24,11 +24,8 @@ from statistics import median
 from rich.console import Console
 from rich.table import Table
 
-from _corpus import CORPUS, unpack_models
+from _corpus import CORPUS, WALKER, unpack_models
 from _pair import Pair, copy_user_environment, print_pairs, time_pair
-
-ROOT = Path(__file__).resolve().parents[1]
-WALKER = ROOT / "fixtures" / "walker" / "DynamicWalkerModel.osim"
 
 LARGEST_SHOWN = 8
 """Number of models in the first table, unless `--each` is set."""
