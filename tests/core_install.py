@@ -76,7 +76,7 @@ NAMES_AN_EXTRA = {
 
 
 class Checker:
-    """Run commands in a working folder, count their exit codes and collect problems.
+    """Runner of commands in a working folder, which counts exit codes and collects problems.
 
     Attributes:
         exit_codes: number of occurrences of each exit code, by command.

@@ -297,7 +297,7 @@ def run_kind(
 
     Returns:
         How often commands ended in each way, and a line for each fault: a traceback, a crash, a
-            hang or a file that was changed.
+        hang or a file that was changed.
     """
     kind, rng, faults, counts = (
         KINDS[name],

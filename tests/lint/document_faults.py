@@ -74,7 +74,7 @@ def _reference(
 
     Returns:
         The file, its text, start and end of the word, the word, and the tag of its element; None if
-            the document has no such word.
+        the document has no such word.
     """
     name, text = _document(project, draw)
     known = set(project.names)

@@ -177,8 +177,7 @@ def test_a_severity_in_the_settings_does_not_change_what_opensim_does():
 
 
 def test_the_index_of_rules_is_that_of_the_rules():
-    # To update the index: python -c "from osimlite.lint.pages import format_index;
-    # print(format_index(), end='')" > docs/rules.md
+    # `python packaging/regenerate.py` updates the index.
     assert (HERE.parents[1] / "docs" / "rules.md").read_text(encoding="utf-8") == format_index()
 
 

@@ -42,7 +42,7 @@ def both(
 
     Returns:
         Final values and speeds (2, n) of osimlite, those of OpenSim, and the numbers of steps of
-            both.
+        both.
     """
     rng = np.random.default_rng(seed)
     with Simulation(osimlite.read(path), **settings) as simulation:

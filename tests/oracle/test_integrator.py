@@ -49,7 +49,7 @@ def manager_run(model, until, accuracy=None, method=None):
 
     Returns:
         The recorded times, the final state, and the counts (taken steps, attempted steps,
-            realizations).
+        realizations).
     """
     sink = opensim.StringLogSink()
     state = model.initSystem()

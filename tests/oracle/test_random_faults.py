@@ -97,7 +97,7 @@ class Tools:
 
         Returns:
             The answer of `tests.oracle.opensim_tools`, and the texts of the files that OpenSim
-                wrote.
+            wrote.
         """
         for file in sorted(self.path.rglob("*"), reverse=True):
             file.rmdir() if file.is_dir() else file.unlink()

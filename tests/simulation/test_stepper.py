@@ -19,10 +19,7 @@ from tests.simulation.equations import Counting, last, oscillator, pendulum, run
         (0.005, [0.005, 0.015]),  # a step that is cut short does not let the next one grow
         (0.0094, [0.0094, 0.0194]),
         (0.0096, [0.0096, 0.0596]),  # nearly a complete step: the next one is five times as large
-        (
-            0.010005,
-            [0.010005, 0.060005],
-        ),  # a little more than a complete step: it is stretched to the limit
+        (0.010005, [0.010005, 0.060005]),  # a complete step is stretched a little to the limit
         (0.0102, [0.01, 0.0102, 0.0602]),  # the remainder needs another step
     ],
 )

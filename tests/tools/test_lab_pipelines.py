@@ -171,8 +171,7 @@ def test_computed_controls_do_not_depend_on_rounding(tmp_path: Path) -> None:
     """Adding the width of an atom to the length of a tendon changes no muscle force.
 
     Fibers of a short muscle at a small activation are stiff. With the accuracy of OpenSim's
-    prediction they do not
-    converge: the first forces change by 0.8 N, those after 0.1 s by 85 N.
+    prediction they do not converge: the first forces change by 0.8 N, those after 0.1 s by 85 N.
     """
     tables = []
     for number in range(choose(2, 3)):

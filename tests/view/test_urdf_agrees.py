@@ -45,8 +45,7 @@ def test_every_shape_is_where_the_scene_has_it(fixtures, tmp_path):
             points = bodies.transform_points(item.body, points)
             ours.append((points.min(axis=0), points.max(axis=0)))
     assert len(ours) == len(theirs) == 9
-    # The programs cut round shapes into different triangles, which changes their extent by up to 1
-    # %.
+    # The programs cut round shapes into different triangles, so their extents differ by up to 1 %.
     for low, high in ours:
         away = [
             max(np.abs(low - a).max(), np.abs(high - b).max()) / np.linalg.norm(high - low)

@@ -43,7 +43,7 @@ def build_library(folder, text, *flags, compiler=COMPILER, name="kernels"):
     """Compile C++ text without a warning, and return the path of the library.
 
     A library with a sanitizer must not be loaded here: it ends a process that did not start with
-        it.
+    it.
 
     Args:
         folder: folder of the files.

@@ -80,8 +80,8 @@ def changed(text: str, draw: random.Random) -> Iterator[tuple[str, str]]:
         text: text of the model.
         draw: source of random numbers.
 
-    Returns:
-        Iterator over texts and descriptions of the changes.
+    Yields:
+        The changed text, and a description of the change.
     """
     from tests.oracle.structural_edits import Text
 
