@@ -144,6 +144,8 @@ def _print_table_info(file: Path, show_all: bool) -> None:
         # Times are rounded in the file, so the mean step is more exact than a single one.
         rate = f", {(rows - 1) / (last - first):.4g} Hz" if last > first else ""
         facts.add("time", f"{first:g} to {last:g} s{rate}")
+    elif rows:
+        facts.add("time", "not readable in every row; see 'osimlite validate'")
     unit = "Units" if table.is_markers else "inDegrees"
     facts.add(unit, header_values.get(unit, "not stated"))
     facts.show()

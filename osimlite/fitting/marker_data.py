@@ -15,6 +15,7 @@ from osimlite.fitting.measurements import Measurements
 from osimlite.io.tables.c3d import ENDING, read_c3d_markers
 from osimlite.io.tables.headers import METRES_PER_UNIT, MarkerHeader
 from osimlite.io.tables.storage import read_sto
+from osimlite.io.tables.vector_rows import DECIMAL_COMMA
 from osimlite.mechanics.multibody.spatial import Array
 
 
@@ -128,9 +129,14 @@ def _parse_number(cell: str, file: str, line: int, index: int) -> float:
     try:
         return float(text) if text else np.nan
     except ValueError:
+        if DECIMAL_COMMA.fullmatch(text):
+            advice = "write decimal points instead of commas"
+        elif index < 2:
+            advice = "each row starts with the number of the frame and its time"
+        else:
+            advice = "leave the cells of an unseen marker empty"
         raise DocumentError(
-            f"'{text}' in column {index + 1} is not a number; leave the cells of an unseen marker "
-            "empty",
+            f"'{text}' in column {index + 1} is not a number; {advice}",
             file=file,
             line=line,
         ) from None

@@ -114,6 +114,8 @@ _MAX_SAMPLED_NUMBERS = 200_000
 # Python's float() also accepts underscores, which C++ does not, and NaN and infinity, which count
 # as missing here.
 _PLAIN = compile_later(rb"[-+]?(\d+(?:\.\d*)?|\.\d+)([eE][-+]?\d+)?")
+# Exponents from 100 on: the number may be beyond the largest one, which C++ does not read.
+_LARGE_EXPONENT = compile_later(rb"[eE]\+?0*[1-9]\d\d")
 _WORD = compile_later(rb"\S+")
 _LETTER = compile_later(rb"[A-Za-z]")
 # A line with a digit, NaN or infinity is taken for a row, even if it has letters as well.
@@ -169,6 +171,12 @@ class RowScanner:
                 # "!" sends it to the examination cell by cell.
                 else (b"!\n" * len(lines), False)
             )
+            if _LARGE_EXPONENT.search(block):
+                forms = shapes.split(b"\n")
+                shapes = b"".join(
+                    (b"!" if _LARGE_EXPONENT.search(text) else form) + b"\n"
+                    for text, form in zip(lines, forms, strict=False)
+                )
             # The usual case: a block of rows of plain numbers is recognised by one comparison.
             if shapes == (plain_shape + b"\n") * len(lines):
                 self._note_rows(lines, [plain_shape] * len(lines), line, zeros)
@@ -327,7 +335,7 @@ class RowScanner:
                 line,
                 end,
                 b"",
-                "; blanks separate them, and tabs must" if blanks else "",
+                "; its cells are separated by spaces instead of tabs" if blanks else "",
             )
             if blanks and self.markers:
                 self._expect_frame(text.split(None, 1)[0], line)
@@ -539,5 +547,9 @@ def _split_blocks(data: bytes, start: int) -> Iterator[bytes]:
 
 
 def parse_number(cell: bytes) -> float:
-    """Return the number in a cell as C++ reads it; NaN for anything else, including NaN and infinity."""
-    return float(cell) if _PLAIN.fullmatch(cell) else nan
+    """Return the number in a cell as C++ reads it; NaN for anything else.
+
+    NaN, infinity and numbers beyond the largest one are not read either.
+    """
+    value = float(cell) if _PLAIN.fullmatch(cell) else nan
+    return value if isfinite(value) else nan

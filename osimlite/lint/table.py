@@ -133,18 +133,20 @@ class Table(CheckTarget):
         """Time span of the rows.
 
         Returns:
-            First and last time, s; None without rows.
+            First and last time, s; None without rows, or if a row has no readable time.
         """
         times = self.rows.times
-        return (times[0], times[-1]) if times else None
+        return (times[0], times[-1]) if times and not self.rows.select("time") else None
 
     @cached_property
     def step(self) -> float:
-        """Usual step from one time to the next, s; 0 with fewer than two rows."""
+        """Usual step from one time to the next, s; 0 if fewer than two rows have a time, or a row has none."""
         from statistics import median
 
         times = self.rows.times
-        return median(after - before for before, after in pairwise(times)) if len(times) > 1 else 0
+        if len(times) < 2 or self.rows.select("time"):
+            return 0
+        return median(after - before for before, after in pairwise(times))
 
     def label_of(self, number: int) -> str:
         """Return the label of a column by its index; in a marker file that of its marker."""

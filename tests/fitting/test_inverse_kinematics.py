@@ -179,6 +179,14 @@ def test_weights_count() -> None:
             r":8: 'gap.*' in column 3 is not a number",
         ),
         (
+            lambda t: t.replace("\n2\t0.5\t", "\n2\t0,5\t"),
+            r":8: '0,5' in column 2 is not a number; write decimal points instead of commas",
+        ),
+        (
+            lambda t: t.replace("\n2\t0.5\t", "\n2\tsoon\t"),
+            r":8: 'soon' in column 2 is not a number; each row starts with .* its time",
+        ),
+        (
             lambda t: t.replace("\n2\t0.5\t", "\n2\t0.5\t1\t1\t"),
             r":8: the row has more than the 14 cells",
         ),

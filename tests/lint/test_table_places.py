@@ -34,7 +34,7 @@ OF_STORAGE = {
     "time with a comma": ("0.3\t", "0,3\t", ["OSIM807 11:1"]),
     "rows missing": ("0.5\t", " 0.9\t", ["OSIM809 13:2"]),
     "time beyond belief": ("0.5\t", "1e308\t", ["OSIM808 13:1", "OSIM809 13:1"]),
-    "time without end": ("0.5\t", "1e999\t", ["OSIM808 13:1", "OSIM809 13:1"]),
+    "time beyond the largest number": ("0.5\t", "1e999\t", ["OSIM807 13:1"]),
     "inDegrees true": ("=yes", "=true", ["OSIM803 5:11"]),
     "small letters": ("inDegrees", "indegrees", ["OSIM803 5:1"]),
     "no version": ("version=1", "version=x", ["OSIM803 2:9"]),

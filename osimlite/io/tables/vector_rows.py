@@ -11,6 +11,10 @@ from osimlite.base.patterns import compile_later
 
 BLANKS = " \t\n\v\f\r"
 """White space that C++ passes over before a number; Python's `strip` knows more."""
+DECIMAL_COMMA = compile_later(r"[-+]?[0-9]+,[0-9]+")
+"""Number with a decimal comma, as spreadsheets of many countries write it."""
+LARGE_NUMBER = compile_later(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)[eE]\+?0*[1-9][0-9]{2,}")
+"""Number with an exponent of three digits or more; one that is not readable is beyond 1.8e308."""
 _NUMBER = compile_later(r"([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))(?:[eE]([-+]?[0-9]+)|([eE]))?")
 
 

@@ -10,7 +10,12 @@ from osimlite.base.patterns import compile_later
 from osimlite.base.text import format_count
 from osimlite.io.document.source import Position
 from osimlite.io.tables.headers import MAX_TIME_S
-from osimlite.io.tables.vector_rows import parse_leading_number, split_vector
+from osimlite.io.tables.vector_rows import (
+    DECIMAL_COMMA,
+    LARGE_NUMBER,
+    parse_leading_number,
+    split_vector,
+)
 from osimlite.lint.diagnostic import Edit, Fix
 from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, rule
 from osimlite.lint.table import Table
@@ -152,7 +157,8 @@ def report_not_a_number(table: Table, report: FindingCollector) -> None:
 
     At the first such cell OpenSim's older reader (version 1 or none) stops: the cell becomes 0, the
     rest of its row repeats the row before, and all later rows are lost, without a message. The
-    newer reader reads NaN, or the number at the beginning of the cell (a warning).
+    newer reader, and that of marker files, read the number at the beginning of the cell, or NaN. The
+    finding is then a warning, except for decimal commas, whose decimals are lost, and for times.
 
     ```sto
       knee
@@ -169,30 +175,40 @@ def report_not_a_number(table: Table, report: FindingCollector) -> None:
     end = table.rows.line_of(table.rows.count - 1) if table.rows.count else 0
     for fault in table.rows.select("cell", "time"):
         label = table.label_of(fault.number)
-        if fault.kind == "time" and (table.is_markers or table.is_strict):
+        value = parse_leading_number(fault.text)
+        is_decimal_comma = bool(DECIMAL_COMMA.fullmatch(fault.text.strip()))
+        # The newer reader and that of marker files ignore what follows a number.
+        ignores_rest = table.is_markers or table.is_strict
+        if ignores_rest and isfinite(value):
+            consequence = f"OpenSim reads {value:g}"
+        elif fault.kind == "time" and ignores_rest:
             consequence = "a row needs a time"
         elif table.is_markers:
             consequence = "OpenSim treats the marker as not seen"
         elif table.is_strict:
-            # The newer reader ignores what follows a number.
-            value = parse_leading_number(fault.text)
-            consequence = (
-                f"OpenSim reads {value:g}" if isfinite(value) else "OpenSim reads it as NaN"
-            )
+            consequence = "OpenSim reads it as NaN"
         # The older reader stops at a word, and fills what is left with zeros.
         else:
             lost_count = max(0, end - fault.line)
+            stored_text = "1.8e308" if LARGE_NUMBER.fullmatch(fault.text) else "0"
             consequence = (
-                f"OpenSim reads 0 and loses the rest of the table, {format_count(lost_count, 'row')}, without "
+                f"OpenSim reads {stored_text} and loses the rest of the table, {format_count(lost_count, 'row')}, without "
                 "a message"
             )
-        problem = f"'{fault.text}' is not a number" if fault.text else "the number is missing"
+        if not fault.text:
+            problem = "the number is missing"
+        elif LARGE_NUMBER.fullmatch(fault.text):
+            problem = f"'{fault.text}' is beyond 1.8e308, the largest number"
+        else:
+            problem = f"'{fault.text}' is not a number"
         report(
             f"{problem} (column '{label}'): {consequence}{fault.describe_repeats()}",
             at=Position(fault.line, fault.column, max(1, fault.length)),
+            # Without its decimals a number is wrong, but plausible.
             severity=WARNING
-            if fault.kind == "cell" and (table.is_markers or table.is_strict)
+            if fault.kind == "cell" and ignores_rest and not is_decimal_comma
             else None,
+            suggestion=fault.text.replace(",", ".") if is_decimal_comma else None,
         )
 
 
@@ -204,8 +220,8 @@ def report_time_order(table: Table, report: FindingCollector) -> None:
 
     Of two rows with one time OpenSim keeps the second, without a message; where time goes back the
     rows before are lost, or the tool stops. OpenSim rejects a marker file or a table of vectors
-    with either. A repeated time in another storage file is a warning, and in the last row an info:
-    OpenSim ends some of its results so.
+    with either. In a storage file with single numbers, a repeated time is a warning. In the last row
+    it is an info, because OpenSim writes the last time of some results twice.
 
     ```sto
       knee
@@ -242,15 +258,16 @@ def report_time_order(table: Table, report: FindingCollector) -> None:
         )
         position = Position(fault.line, fault.column, fault.length)
         report(f"the time {problem}{fault.describe_repeats()}", at=position, severity=severity)
-    times = table.rows.times
+    # Rows without a readable time have a substitute that may be at the end of all numbers.
+    times = [] if table.span is None else table.rows.times
     # Times grow: what is too large is at the ends. A time that goes back is reported above.
     far_rows = [row for row in (0, len(times) - 1) if times and abs(times[row]) >= MAX_TIME_S]
     if far_rows:
         # Damaged times may also be large and negative at the end.
         row = next(row for row, time in enumerate(times) if abs(time) >= MAX_TIME_S)
         report(
-            f"the time {times[row]:g} s cannot be a time of a motion: splines through the table overflow, "
-            "and osimlite does not read it",
+            f"the time {times[row]:g} s is too large for a motion: osimlite does not read the table, "
+            "because splines through it would overflow",
             at=Position(table.rows.line_of(row), 1),
         )
 
