@@ -98,8 +98,9 @@ def run(
     are skipped. Finished setups are recorded, and --resume continues after Ctrl-C, a crash or an
     error. With -o each of several setups has its own subfolder.
 
-    A result replaces an existing file only if that is a result of the same type. It is not written
-    through a link, under a hidden name, or outside the setup's project and the current folder. See
+    A result replaces an existing file only if that is a result of the same type. Results are not
+    written through links, under hidden names, or outside both the current folder and the project of
+    the setup, which is the nearest folder above it with .git, osimlite.toml or pyproject.toml. See
     --overwrite and --write-outside.
 
     For a Moco study, --report also simulates the solution, and reports how far simulation and

@@ -52,8 +52,8 @@ def static_optimization(
     StaticOptimization_controls.xml, like OpenSim's analysis, with an exact solution at each time.
     Muscles alone can rarely move a pelvis: add reserve actuators with --forces. If there is no
     solution within min_control and max_control, the coordinates that lack strength are reported,
-    the files have no numbers at these times, and the exit code is 1. Filter motions from motion
-    capture first: --lowpass 6.
+    the tables have NaN at these times, and the exit code is 1. Filter motions from motion capture
+    first: --lowpass 6.
 
     Example: osimlite static-optimization gait.osim walk.mot --lowpass 6 --external-loads grf.xml
         --forces reserves.xml

@@ -7,6 +7,7 @@ lengths by `tendon_slack_length`.
 from collections.abc import Iterator
 from typing import Annotated
 
+from osimlite.base.text import add_article
 from osimlite.schema.base import ModelComponent, make_default
 from osimlite.schema.facts import (
     BELOW_QUARTER_TURN,
@@ -133,9 +134,14 @@ class Muscle(PathActuator, abstract=True):
 
 def check_complete_dynamics(muscle: Muscle) -> Iterator[Contradiction]:
     """Yield the flags that OpenSim rejects in a class whose tendon is elastic and whose activation has dynamics."""
-    for flag in ("ignore_tendon_compliance", "ignore_activation_dynamics"):
+    impossible_muscles = {
+        "ignore_tendon_compliance": "have a rigid tendon",
+        "ignore_activation_dynamics": "be without activation dynamics",
+    }
+    for flag, impossible_muscle in impossible_muscles.items():
         if getattr(muscle, flag):
-            yield flag, f"{flag} is true, which this class does not have"
+            class_name = add_article(type(muscle).__name__)
+            yield flag, f"{flag} is true, but {class_name} cannot {impossible_muscle}"
 
 
 class ActivationFiberLengthMuscle(Muscle, abstract=True):

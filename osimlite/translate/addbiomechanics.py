@@ -337,7 +337,7 @@ class SubjectFolder:
             self.fidelity.add(
                 "missing-forces",
                 f"{trial_path}/ground_forces",
-                "that forces of a frame are missing or wrong",
+                "missing or wrong forces of a frame",
                 f"the forces are written, and {MISSING_FILE} has the reasons; do not trust inverse dynamics in these frames",
                 f"{int((reason_codes != 0).sum())} of {trial.frame_count} frames: {summary}",
             )
@@ -359,8 +359,8 @@ class SubjectFolder:
             "center-of-pressure",
             f"{trial_path}/ground_forces",
             "centres of pressure, which are zero in some frames of the file, and whose torque is parallel to the force",
-            "computed from the measured force and moment, with a vertical torque: force, point and torque "
-            "together are equal to these exactly",
+            "computed from the measured force and moment, with a vertical torque; force, point and torque "
+            "together give exactly the measured force and moment",
             errors=errors,
         )
 

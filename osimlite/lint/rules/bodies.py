@@ -138,7 +138,7 @@ def report_no_inertia(subject: Subject, report: FindingCollector) -> None:
 
     OpenSim treats the mass of the body as one point: nothing resists a rotation about this point.
     If the body is the last of its chain and its joint rotates it about this point, accelerations
-    become NaN (an error). Otherwise the integrator may take ever smaller steps.
+    become NaN, and the finding is an error. Otherwise the integrator may take ever smaller steps.
 
     ```xml
     - <Body name="thigh"> <mass>8</mass> </Body>

@@ -34,7 +34,8 @@ def report_broken_expression(subject: Subject, report: FindingCollector) -> None
 
     OpenSim rejects the model if a formula has a syntax error. With an unknown variable, OpenSim
     fails at the first acceleration. OpenSim does not compute the formulas of a disabled force or
-    controller (a warning). But it rejects a syntax error in a formula of a force even then.
+    controller, and the finding is a warning. But it rejects a syntax error in a formula of a force
+    even then.
     Formulas support + - * / ^, functions such as sin, sqrt, exp, min, step, and definitions after a
     semicolon as in `k*q; k=100`. There is no pi and no `**`. OpenSim first simplifies a formula:
     `0*x` becomes 0, even if the variable x is unknown.

@@ -47,8 +47,9 @@ def report_unsorted_abscissae(subject: Subject, report: FindingCollector) -> Non
     A GCVSpline with such points is rejected, or makes OpenSim fail when a force or a controller
     needs its value. A SimmSpline divides by the difference of the x values and gives values in the
     millions, without a message. A piecewise function uses the wrong piece. Moment arms and moving
-    points are then wrong. If the same point is given twice, a SimmSpline is constant there (a
-    warning). OpenSim does not compute the functions of a disabled controller or force (a warning).
+    points are then wrong. The finding is a warning in two cases: if the same point is given twice,
+    where a SimmSpline is constant, and if the controller or force is disabled, so that OpenSim does
+    not compute its functions.
 
     ```xml
       <Coordinate name="knee_angle">
@@ -199,10 +200,10 @@ def report_too_few_points(subject: Subject, report: FindingCollector) -> None:
 def report_coefficient_count(subject: Subject, report: FindingCollector) -> None:
     """A linear function or a polynomial has too many or too few coefficients.
 
-    Reports linear functions without coefficients (an error), and polynomials of several variables
-    whose number of coefficients does not match their dimension and order (an error). A linear
-    function of a joint axis or a coordinate coupler needs one coefficient for each coordinate, and
-    a constant. Fewer are an error, more are a warning (an error if there is no coordinate).
+    Reports linear functions without coefficients, and polynomials of several variables whose number
+    of coefficients does not match their dimension and order; both are errors. A linear function of a
+    joint axis or a coordinate coupler needs one coefficient for each coordinate, and a constant.
+    Fewer are an error. More are a warning, or an error if there is no coordinate.
 
     If a linear function has no coefficients, OpenSim crashes. If a polynomial has the wrong number,
     OpenSim fails when it needs the value. If the constant of a linear function is missing, OpenSim

@@ -39,8 +39,8 @@ def report_unknown_name(setup: Setup, report: FindingCollector) -> None:
     the states, controls and outputs that the study names by path or pattern.
 
     Most tools reject the setup, some crash. OpenSim ignores missing markers of tasks, bodies of
-    scale factors and muscles of an analysis without a message (warnings). It also ignores patterns
-    without a match (a warning).
+    scale factors and muscles of an analysis without a message, and patterns without a match. These
+    findings are warnings.
 
     ```setup
       <AnalyzeTool name="analyze">

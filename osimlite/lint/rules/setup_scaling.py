@@ -179,7 +179,7 @@ def report_scale_setting(setup: Setup, report: FindingCollector) -> None:
     for placer in setup.find_by_class("MarkerPlacer"):
         if not placer.apply:
             report(
-                "the markers are not placed, and the tool says that it failed",
+                "MarkerPlacer is off: OpenSim's ScaleTool scales the model, but then reports a failure",
                 placer,
                 tag="apply",
                 fault="markers-not-placed",

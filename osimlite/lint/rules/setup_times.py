@@ -92,7 +92,7 @@ def report_time_outside_data(setup: Setup, report: FindingCollector) -> None:
 
     Inverse kinematics cuts the times to the data without a message. Without a time range it stops
     at 2 s: OpenSim 4.6 intends to use all data, but does not. If times are in the wrong order, or
-    completely outside the data, the tools fail or crash (an error).
+    completely outside the data, the tools fail or crash; these findings are errors.
     """
     for item in setup.find_having("time_range"):
         count = len(item.time_range)

@@ -486,10 +486,11 @@ def report_column_label(table: Table, report: FindingCollector) -> None:
     The first column of a storage file must be `time`, in lower case. Every column needs a unique
     label. Labels of markers must not contain blanks, every marker needs one, and the columns of
     frame and time must be labelled `Frame#` and `Time`. In a storage file of version 2 or 3 tabs
-    must separate the labels (a warning; in tables of vectors an error).
+    must separate the labels; other separators are a warning, in tables of vectors an error.
 
     Without a column `time` OpenSim rejects the table. Of two columns with one label it finds the
-    first (a warning), and reads no loads from them; it rejects a file with two markers of one name.
+    first, and reads no loads from them; the finding is a warning. It rejects a file with two markers
+    of one name.
     A blank splits a label in two, so all following labels name the wrong columns.
     """
     labels, header = table.labels, table.header

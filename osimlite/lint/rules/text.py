@@ -190,7 +190,8 @@ def report_document_version(subject: Subject, report: FindingCollector) -> None:
     OpenSim had no such socket at that time.
 
     OpenSim reads each file by the rules of its version. If the version is missing, OpenSim fails.
-    If the version is unknown, OpenSim reads what it understands, without a message (a warning).
+    If the version is unknown, OpenSim reads what it understands, without a message; the finding is
+    then a warning.
 
     ```document
     - <OpenSimDocument>

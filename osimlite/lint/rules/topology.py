@@ -30,10 +30,10 @@ def report_unconnected_body(subject: Subject, report: FindingCollector) -> None:
 
     Reports bodies that no chain of joints connects to ground.
 
-    OpenSim adds a free joint to ground, and the body falls freely (a warning). If the body has no
-    mass, OpenSim rejects the model. With each joint that it adds, OpenSim loses the order of the
-    joints before it. It may then reject the model, or crash, if offset frames or further joints are
-    on the bodies of these joints.
+    OpenSim adds a free joint to ground, and the body falls freely; the finding is then a warning.
+    If the body has no mass, OpenSim rejects the model. When OpenSim adds a joint, it no longer sorts
+    the joints that precede it in the file from ground outwards. If offset frames or further joints
+    are on the bodies of those joints, OpenSim may then reject the model, or crash.
 
     ```xml
       <Body name="ball"> <mass>1</mass> <inertia>0.1 0.1 0.1 0 0 0</inertia> </Body>

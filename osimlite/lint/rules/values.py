@@ -116,7 +116,7 @@ def report_cut_number(subject: Subject, report: FindingCollector) -> None:
 
     OpenSim reads the longest beginning that is a number and ignores the rest without a message:
     `1,5` is 1, `0x10` is 0. If only a separator follows, as in `0.1, 0.5`, OpenSim reads the
-    intended number (a warning).
+    intended number, and the finding is a warning.
 
     ```xml
     - <Body name="thigh"> <mass>8,5</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
@@ -148,10 +148,10 @@ def report_empty_value(subject: Subject, report: FindingCollector) -> None:
     Reports empty numbers, vectors and switches, and empty elements that should contain an object.
     Optional properties may be empty.
 
-    OpenSim usually writes a line to its log and keeps the default (a warning). The mass of a body
-    has no default, and numbers of older setup classes have none either, such as `initial_time` of
-    AnalyzeTool: OpenSim rejects the file. If an object is missing, OpenSim fails as soon as it
-    needs one. These two cases are errors.
+    OpenSim usually writes a line to its log and keeps the default; the finding is then a warning. It
+    is an error in two cases. The mass of a body has no default, and numbers of older setup classes
+    have none either, such as `initial_time` of AnalyzeTool: OpenSim rejects the file. If an object
+    is missing, OpenSim fails as soon as it needs one.
 
     ```xml
       <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia>

@@ -41,7 +41,7 @@ class Generation:
 
     def __str__(self) -> str:
         rate = f"{self.per_minute:.3g} generations/min"
-        return f"{self.number:5d}  best {self.best:.6g}  median {self.median:.6g}  longest {self.longest:.2f} s  {rate}"
+        return f"{self.number:5d}  best {self.best:.6g}  median {self.median:.6g}  longest motion {self.longest:.2f} s  {rate}"
 
 
 def search_parameters(
