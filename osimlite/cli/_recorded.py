@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from osimlite.base.files import make_folder
 from osimlite.base.quantity import LARGEST_JOINT_ANGLE
-from osimlite.base.text import join_words
+from osimlite.base.text import format_count, join_words
 from osimlite.cli._console import say
 from osimlite.io.tables.storage import StoTable, write_sto
 from osimlite.simulation.recorded_motion import RecordedMotion
@@ -69,7 +69,7 @@ def print_motion_summary(recorded: RecordedMotion, files: Iterable[Path]) -> Non
         )
     times = recorded.times
     paths = join_words([str(file) for file in files])
-    say(f"{len(times)} rows from {times[0]:g} s to {times[-1]:g} s; wrote {paths}")
+    say(f"{format_count(len(times), 'row')} from {times[0]:g} s to {times[-1]:g} s; wrote {paths}")
 
 
 def warn_of_extrapolated_loads(loads: str | Path | None, recorded: RecordedMotion) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from osimlite.base.text import join_words
+from osimlite.base.text import format_count, join_words
 from osimlite.cli import _options as options
 from osimlite.cli._command import Option, command_with
 from osimlite.cli._console import print_table, say
@@ -146,7 +146,8 @@ def translate(
     summary = (
         ", ".join(f"{count} {part_type}" for part_type, count in translated.summary.items())
         if robot is None
-        else f"{len(robot.links)} links, {len(robot.joints)} joints of which {len(robot.moving)} move"
+        else f"{format_count(len(robot.links), 'link')}, {format_count(len(robot.joints), 'joint')} "
+        f"({len(robot.moving)} moving)"
     )
     say(f"{summary}; wrote " + join_words([str(path) for path in paths], max_count=4))
     # Some formats cannot express the initial state, and say so.

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from osimlite.base.records import replace
-from osimlite.base.text import suggest_name
+from osimlite.base.text import format_count, suggest_name
 from osimlite.errors import SettingError
 from osimlite.fitting.fitted_motion import FittedMotion
 from osimlite.fitting.marker_data import MarkerData, MarkerSource
@@ -171,9 +171,9 @@ def fit_motion(
         or np.abs(data.times - orientation_data.times).max() > TIME_TOLERANCE_S
     ):
         raise SettingError(
-            f"the {len(data.times)} frames of the markers and the {len(orientation_data.times)} frames of "
-            "the orientations have "
-            "different times; resample one of them"
+            f"the {format_count(len(data.times), 'frame')} of the markers and the "
+            f"{format_count(len(orientation_data.times), 'frame')} of the orientations have different times; "
+            "resample one of them"
         )
     if not data.names:
         # Orientations determine no positions.

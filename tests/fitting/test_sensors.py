@@ -310,7 +310,7 @@ def test_what_cannot_be_fitted_is_told() -> None:
         ),
         ("is invalid", {"orientations": sensors, "weights": {"thigh_imu": -1.0}}),
         (
-            "8 frames of the markers and the 1 frames of the",
+            "8 frames of the markers and the 1 frame of the",
             {"markers": places, "orientations": {"thigh_imu": np.eye(3)}},
         ),
     ):

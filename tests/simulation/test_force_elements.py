@@ -176,7 +176,7 @@ def test_what_cannot_be_computed_is_named(make, message):
             lambda: ExpressionBasedCoordinateForce(name="a", coordinate="q0", expression="3*x"),
             "the expression of '/forceset/a' is '3\\*x': there is no 'x'",
         ),
-        (lambda: controlled(PrescribedController(name="c")), "has 0 functions for 1 actuators"),
+        (lambda: controlled(PrescribedController(name="c")), "has 0 functions for 1 actuator;"),
     ],
 )
 def test_what_has_no_meaning_is_said(make, message):

@@ -8,7 +8,7 @@ from itertools import chain
 from typing import Any
 
 from osimlite.base.quantity import LARGEST_JOINT_ANGLE
-from osimlite.base.text import join_words
+from osimlite.base.text import format_count, join_words
 from osimlite.lint.posture import coordinate_name, find_angles
 from osimlite.lint.registry import ERROR, WARNING, FindingCollector, rule
 from osimlite.lint.setup import Setup, select_members
@@ -261,7 +261,9 @@ def _describe_guess_fault(setup: Setup, tree: Tree, guess: Table) -> str:
     total = sum(int(number) for number in counts_by_kind.values() if number.isdecimal())
     count = len(guess.columns)
     if total != count:
-        return f"has {count} columns, but the counts in its header add up to {total}"
+        return (
+            f"has {format_count(count, 'column')}, but the counts in its header add up to {total}"
+        )
     states = find_variables(tree, "state variable")
     # OpenSim reads the first columns as states, by their number.
     faulty = next(

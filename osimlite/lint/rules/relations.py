@@ -137,7 +137,7 @@ def _check_function_based_path(path: Any, owner: Any) -> Iterator[Contradiction]
     arms = path.moment_arm_functions
     count = len(coordinates)
     if arms and len(arms) != count:
-        counts = f"{len(arms)} functions for {format_count(count, 'coordinate')}"
+        counts = f"{format_count(len(arms), 'function')} for {format_count(count, 'coordinate')}"
         yield "moment_arm_functions", f"moment_arm_functions has {counts}"
     # The speed depends on all coordinates and their speeds.
     functions = [("length_function", path.length_function, count)]

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from osimlite.base.quantity import LARGEST_JOINT_ANGLE
+from osimlite.base.text import format_count
 from osimlite.io.tables.headers import MarkerHeader
 from osimlite.lint.diagnostic import Severity
 from osimlite.lint.posture import coordinate_name, find_angles
@@ -117,8 +118,8 @@ def report_time_outside_data(setup: Setup, report: FindingCollector) -> None:
     for item, tag, motion in find_motions(setup):
         if 0 < motion.rows.count < 6:
             report(
-                f"'{getattr(item, tag)}' has {motion.rows.count} rows: OpenSim needs at least six "
-                "for its spline",
+                f"'{getattr(item, tag)}' has {format_count(motion.rows.count, 'row')}: OpenSim needs "
+                "at least six for its spline",
                 item,
                 tag=tag,
                 fault="few-rows",

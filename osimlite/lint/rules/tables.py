@@ -154,8 +154,8 @@ def _check_marker_header(table: Table, header: MarkerHeader, report: FindingColl
             )
         elif len(values) != len(keys):
             report(
-                f"found {len(values)} values for the {len(keys)} keys above them: OpenSim rejects "
-                "the file",
+                f"found {format_count(len(values), 'value')} for the {len(keys)} keys in the line above: "
+                "OpenSim rejects the file",
                 at=Position(3, 1),
             )
     # The fifth line names the coordinates of each marker; OpenSim expects X1 Y1 Z1 X2 and so on.
