@@ -124,7 +124,8 @@ class RecordedMotion(Movement):
         """Return sentences about coordinates without a column, and columns without a coordinate.
 
         Args:
-            computed: coordinates that the caller computes from others where the record lacks them.
+            computed: names of coordinates whose values the caller provides where the record lacks
+                them, and which are not named.
         """
         sentences = []
         if missing := [name for name in self.missing if name not in computed]:

@@ -66,21 +66,25 @@ def read_recording(
         mechanism: mechanism of `model`.
         path: motion file (.sto or .mot).
         forces: file with forces; None to compute them.
-        values: coordinates by name (rad, m) that keep a constant value instead of that in the file.
+        values: constant values (rad, m) by the names or paths of coordinates, which replace those in
+            the file.
         folder: folder of the model's file, where the files of contact meshes are searched.
 
     Raises:
         OsimliteError: a file is missing or is not a motion; see :meth:`.RecordedMotion.read`.
     """
     recorded_motion = RecordedMotion.read(mechanism, path)
-    # The caller's values replace those of the file.
+    # The caller's values replace those of the file; their keys may be names or paths.
     rows = recorded_motion.values
-    for name, value in (values or {}).items():
-        rows[:, mechanism.coordinate_index(name)] = value
+    replaced_names = set()
+    for key, value in (values or {}).items():
+        index = mechanism.coordinate_index(key)
+        rows[:, index] = value
+        replaced_names.add(mechanism.coordinates[index].name)
     coupled_names = _follow_couplers(mechanism, rows, set(recorded_motion.missing))
     table = read_sto(path)
     speeds = _read_speeds(mechanism, table)
-    remarks = recorded_motion.describe_columns(coupled_names | set(values or {}))
+    remarks = recorded_motion.describe_columns(coupled_names | replaced_names)
     columns: Mapping[str, Array] = {}
     if forces is not None:
         columns = _find_columns(read_sto(forces), recorded_motion.times)

@@ -111,6 +111,11 @@ def test_columns_that_do_not_move_the_model_are_named(
         "not in the motion, default value used: knee_angle",
         "ignored columns, which are not coordinates: kne_angle",
     ]
+    # A coordinate that the user sets, by name or by path, has no default value.
+    for name in ("knee_angle", "/jointset/knee/knee_angle"):
+        files = str(lab / "leg.osim"), str(tmp_path / "walk.mot")
+        assert run(*files, "--set", f"{name}=10deg", "--html", page) == 0
+        assert "default value used" not in capsys.readouterr().out
     (tmp_path / "walk.mot").write_text(text)
     assert run(str(lab / "leg.osim"), str(tmp_path / "walk.mot"), "--html", page) == 0
     assert capsys.readouterr().out.startswith("wrote ")
