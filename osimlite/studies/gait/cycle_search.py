@@ -199,7 +199,7 @@ class CycleSearch:
         if len(self.footing.feet) != 2:
             raise SettingError(
                 f"the search for cycles needs two feet, but '{engine.mechanism.name}' has "
-                f"{len(self.footing.feet)}; name two with --feet"
+                f"{len(self.footing.feet)}; name two with --foot"
             )
         self._first: StepMap | None = None
 
