@@ -229,8 +229,8 @@ class Options(IntegrationOptions):
     )
     route: str = define_option(
         "auto",
-        more='algorithm of the engine "bullet" for accelerations: "mass-matrix" (also for "auto") or '
-        '"articulated-body".',
+        more='algorithm of the engine "bullet" for accelerations: "mass-matrix" or "articulated-body". "auto" selects '
+        '"mass-matrix", but "articulated-body" for a model that allows it and has an inertia that no body can have.',
     )
     wrapping: str = define_option(
         "opensim",

@@ -80,7 +80,8 @@ class BulletEngine(KernelEngine):
     Args:
         mechanism: the mechanism.
         forces: forces on it besides gravity.
-        route: "mass-matrix" (also "auto") or "articulated-body".
+        route: "mass-matrix" or "articulated-body"; "auto" selects "mass-matrix", but
+            "articulated-body" for a model that allows it and has an impossible inertia.
         show: whether Bullet's window opens.
         visuals: shapes of the bodies; None for none.
 
