@@ -11,7 +11,7 @@ import numpy as np
 
 from osimlite.base.quantity import warn_caller
 from osimlite.base.records import dataclass
-from osimlite.base.text import join_words, suggest_name
+from osimlite.base.text import format_count, join_words, suggest_name
 from osimlite.errors import SettingError, SimulationError
 from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.kernels.layout import ITEM, MODEL
@@ -246,9 +246,14 @@ def _interpolate_linearly(
     """
     x = np.asarray(times, dtype=float)
     y = np.asarray(values, dtype=float)
-    if x.ndim != 1 or x.shape != y.shape or not len(x):
+    if not x.size and not y.size:
         raise SettingError(
-            f"the control of '{name}' has {x.size} times, but {y.size} values; give one value for each time"
+            f"the control of '{name}' has no times; give at least one time and value"
+        )
+    if x.ndim != 1 or x.shape != y.shape:
+        raise SettingError(
+            f"the control of '{name}' has {format_count(x.size, 'time')}, but {format_count(y.size, 'value')}; "
+            "give one value for each time"
         )
     if not (np.isfinite(x).all() and np.isfinite(y).all() and (np.diff(x) > 0.0).all()):
         raise SettingError(

@@ -40,7 +40,7 @@ def spring(moment_arm_functions=(), **properties):
         ),
         (
             {"coordinate_paths": TWO, "length_function": Sine()},
-            "function of 1 variables, but 2 coordinates",
+            "function of 1 variable, but gets 2 arguments",
         ),
         (TWICE, "name each once"),
         (
@@ -61,14 +61,14 @@ def spring(moment_arm_functions=(), **properties):
                 "length_function": PLANE,
                 "lengthening_speed_function": PLANE,
             },
-            "'lengthening_speed_function' of .* but 4 coordinates",
+            "'lengthening_speed_function' of .*, but gets 4 arguments",
         ),
         (
             {
                 "coordinate_paths": TWO,
                 "length_function": ExpressionBasedFunction(expression="q", variables=("q",)),
             },
-            "has 1 variables, but is called with 2",
+            "has 1 variable for 2 arguments",
         ),
         (
             {

@@ -160,11 +160,11 @@ def test_the_kernel_alone(model, code):
         ),
         (
             {"second": ([0.0, 1.0], [1.0])},
-            "the control of 'second' has 2 times, but 1 values; give one value for each time",
+            "the control of 'second' has 2 times, but 1 value; give one value for each time",
         ),
         (
             {"second": ([], [])},
-            "the control of 'second' has 0 times, but 0 values; give one value for each time",
+            "the control of 'second' has no times; give at least one time and value",
         ),
         (
             {"second": ([0.0, 0.0], [1.0, 2.0])},

@@ -8,7 +8,13 @@ from itertools import pairwise
 from math import isfinite
 from typing import TYPE_CHECKING, Any, cast
 
-from osimlite.base.text import SAME_CLASS_SIMILARITY, add_article, join_words, suggest_name
+from osimlite.base.text import (
+    SAME_CLASS_SIMILARITY,
+    add_article,
+    format_count,
+    join_words,
+    suggest_name,
+)
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.mechanics.multibody import functions as f
 from osimlite.schema import functions as schema
@@ -92,7 +98,8 @@ class _Impossible(Exception):
 def _require_argument_count(function: Object, expected: int, count: int) -> None:
     if count != expected:
         raise _Impossible(
-            f"it is a function of {expected} variables, but {count} coordinates are listed; list {expected}"
+            f"it is a function of {format_count(expected, 'variable')}, but gets "
+            f"{format_count(count, 'argument')}; use a function of as many variables, or list other coordinates"
         )
 
 
@@ -105,7 +112,9 @@ def _convert_linear(function: schema.LinearFunction, arguments: int) -> f.Smooth
     """
     count = len(function.coefficients)
     if count <= arguments:
-        raise _Impossible(f"it has {count} coefficients; give {arguments + 1}, the constant last")
+        raise _Impossible(
+            f"it has {format_count(count, 'coefficient')}; give {arguments + 1}, the constant last"
+        )
     # OpenSim uses the coefficient after the weights as the constant, and ignores those after it.
     weights = function.coefficients[:arguments]
     start = function.coefficients[arguments]
@@ -130,7 +139,8 @@ def _read_points(
     y = tuple(function.y)[: len(x)]
     if len(x) != len(y) or len(x) < least:
         raise _Impossible(
-            f"it has {len(x)} x values and {len(y)} y values; give the same number of both, at least {least}"
+            f"it has {format_count(len(x), 'x value')} and {format_count(len(y), 'y value')}; "
+            f"give the same number of both, at least {least}"
         )
     if not all(map(isfinite, (*x, *y))):
         raise _Impossible("a point is not finite; give numbers")

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any, ClassVar
 
 from osimlite.base.records import dataclass
+from osimlite.base.text import format_count
 from osimlite.errors import ModelError
 from osimlite.mechanics.kernels.function_paths import FUNCTION_PATH_WORK, FUNCTION_WORK
 from osimlite.mechanics.kernels.layout import ITEM
@@ -178,7 +179,8 @@ def read_function_path(builder: ElementBuilder, owner: Any) -> CoordinatePath:
     moment_arm_functions = path.moment_arm_functions
     if moment_arm_functions and len(moment_arm_functions) != count:
         raise ModelError(
-            f"'{where}' has {len(moment_arm_functions)} moment_arm_functions for {count} coordinates; give one for each, or none"
+            f"'{where}' has {len(moment_arm_functions)} moment_arm_functions for "
+            f"{format_count(count, 'coordinate')}; give one for each, or none"
         )
     arms = tuple(
         _read_function(item, count, f"'moment_arm_functions[{number}]' of '{where}'")
@@ -207,8 +209,8 @@ def _read_function(function: Any, arguments: int, description: str) -> SmoothFun
     if isinstance(function, ExpressionBasedFunction):
         if len(function.variables) != arguments:
             raise ModelError(
-                f"{description} has {len(function.variables)} variables, but is called with {arguments}; name "
-                f"{arguments} variables"
+                f"{description} has {format_count(len(function.variables), 'variable')} for "
+                f"{format_count(arguments, 'argument')}; name one variable for each"
             )
         return Formula.parse(function.expression, function.variables, description)
     return convert_function(function, arguments, description)
