@@ -104,7 +104,7 @@ def solve(
         folder: folder of the files that a study without a file names; the current folder if None.
         tell: function that is called with the progress after each iteration. Ctrl-C stops the
             search, and the solution is then the best iterate.
-        refine: error below which each interval of the mesh is to be brought by splitting, see
+        refine: largest error of an interval of the mesh: intervals above it are split, see
             :class:`Refinement`; None to keep the mesh.
         scaled: column of the goal's table that each scale factor of a goal multiplies, by the
             factor's name: what OpenSim's ``addScaleFactor`` receives, and no file contains.

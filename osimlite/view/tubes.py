@@ -231,7 +231,7 @@ def _unit_or_zero(a: Vector) -> Vector:
 
 
 def _find_perpendicular(a: Vector) -> Vector:
-    """Return a vector perpendicular to another, and to the axis along which that is shortest."""
+    """Return a vector perpendicular to `a` and to the axis of its smallest component."""
     x, y, z = a
     least = min(abs(x), abs(y), abs(z))
     axis = 0 if abs(x) == least else (1 if abs(y) == least else 2)

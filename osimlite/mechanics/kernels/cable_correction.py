@@ -138,8 +138,8 @@ def correct_geodesics(
     solve_minimum_norm(equations, size, a, rank, values, at(values, equations), corrections)
     for k in range(size):
         corrections[k] = -corrections[k]
-    # Turn no end by more than MAX_ROTATION_RAD, for which the linearization holds; all geodesics take the
-    # same part.
+    # Turn no end by more than MAX_ROTATION_RAD, for which the linearization holds; all geodesics
+    # take the same part.
     step, number = 1.0, 0
     for k in range(first + 1, last):
         obstacle_record = at(record, elements[ELEMENT.SIZE * k + ELEMENT.RECORD])

@@ -253,8 +253,8 @@ def response_record(model: Ints, work: Floats, number: int) -> Floats:
 def fill_mass_matrix(model: Ints, data: Floats, mass: Floats) -> None:
     """Fill the mass matrix, with heavy masses along the constraint equations.
 
-    The equation G du = 0 is replaced by a mass CONSTRAINT_MASS times the largest entry of M along each row of
-    G. Multipliers would need a larger, indefinite system. The small motion that remains
+    The equation G du = 0 is replaced by a mass CONSTRAINT_MASS times the largest entry of M along
+    each row of G. Multipliers would need a larger, indefinite system. The small motion that remains
     across the constraints is removed by the projection of the step.
 
     Args:

@@ -10,8 +10,8 @@ bound, so that the active set changes as a whole (L. Qi, J. Sun, A nonsmooth ver
 method, Math. Programming 58, 1993). Each frame starts from the multipliers of the previous one.
 Other exponents p are reached by Newton steps, each of which is a weighted problem with p = 2.
 
-A proximal term PROXIMAL_WEIGHT |λ - λ'|² makes the dual function strictly concave, where λ' is the previous
-solution (R. T. Rockafellar, Augmented Lagrangians and applications of the proximal point
+A proximal term PROXIMAL_WEIGHT |λ - λ'|² makes the dual function strictly concave, where λ' is the
+previous solution (R. T. Rockafellar, Augmented Lagrangians and applications of the proximal point
 algorithm, Math. Oper. Research 1, 1976). Redundant equations are therefore harmless, and if the
 problem is infeasible, the residual b - A x converges to the shortest possible one.
 """

@@ -275,8 +275,8 @@ def multiply_powers(
 def set_controls(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
     """Compute each control as the sum of some functions of time.
 
-    The integers of the record from DETAILS on are the number of controls, per control the cumulative number
-    of its functions, and the offsets of the functions' tables among the numbers.
+    The integers of the record from DETAILS on are the number of controls, the cumulative number of
+    functions of each control, and the offsets of the functions' tables among the numbers.
 
     Args:
         model: integers of the model.

@@ -96,7 +96,8 @@ def restore_equations(m: Fit, y: Floats) -> bool:
             largest_error = max(largest_error, abs(errors[k]))
         if largest_error <= MAX_EQUATION_ERROR:
             return True
-        # Rounding may keep the errors above MAX_EQUATION_ERROR; then the search ends when they stop to halve.
+        # Rounding may keep the errors above MAX_EQUATION_ERROR; then the search ends when a step
+        # no longer halves them.
         if largest_error <= 1e-9 and largest_error >= 0.5 * previous_error:
             return True
         previous_error = largest_error

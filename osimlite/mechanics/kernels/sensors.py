@@ -2,9 +2,9 @@
 
 The plan of a row consists of integers: a head, `SENSOR_PLAN`; per muscle the indices in `data` of
 `OF_MUSCLES`; per coordinate limit force the coordinate and the index of the force in `data`; the
-link of each body; per leg its hip-side body (pelvis) and its foot, and the range of the contacts of the foot.
-The numbers of a row are a head, `SENSOR_NUMBERS`; optimal fiber lengths (m) and strengths (N); smallest and
-largest controls; mass centres in the links (m) and masses (kg).
+link of each body; per leg its hip-side body (pelvis) and its foot, and the range of the contacts of
+the foot. The numbers of a row are a head, `SENSOR_NUMBERS`; optimal fiber lengths (m) and strengths
+(N); smallest and largest controls; mass centres in the links (m) and masses (kg).
 """
 
 from __future__ import annotations
@@ -38,15 +38,16 @@ class SENSOR_PLAN(metaclass=Record):
     """Head of the plan of a sensor row.
 
     Attributes:
-        MUSCLES, COORDINATES, LEGS, LIMITS, BODIES, CONTROLS, NUMBERS: numbers of muscles, coordinates,
-            legs, coordinate limit forces, bodies, controls, and of numbers of the row.
+        MUSCLES, COORDINATES, LEGS, LIMITS, BODIES, CONTROLS: numbers of muscles, coordinates, legs,
+            coordinate limit forces, bodies and controls.
+        NUMBERS: count of the numbers of the row, see `SENSOR_NUMBERS`.
         LENGTHS, VELOCITIES: offsets of fiber lengths and velocities over the optimal lengths (1, 1/s).
         FORCES, ACTIVATIONS, ACTIVE: offsets of tendon forces over the strengths, activations, and
             active fiber forces (N).
         VALUES, SPEEDS, MOMENTS: offsets of coordinates, speeds, and limit forces (N, N m).
         LOADS: offset of the ground reaction force of each leg over the weight.
-        POSITIONS, CENTRE, RISE: offsets of the mass centres of bodies and of all (m), and of the vertical
-            velocity of the latter (m/s).
+        POSITIONS, CENTRE, RISE: offsets of the mass centres of bodies and of all (m), and of the
+            vertical velocity of the latter (m/s).
     """
 
     MUSCLES, COORDINATES, LEGS, LIMITS, BODIES, CONTROLS, NUMBERS = range(7)

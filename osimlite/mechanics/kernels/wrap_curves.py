@@ -259,7 +259,7 @@ def distance_to_sphere(start: Vector, ray: Vector) -> float:
     """Return the multiple of a direction that leads from a point to the unit sphere.
 
     Args:
-        start: point from which the direction leads.
+        start: point from which the ray begins.
         ray: direction, of any length.
 
     Returns:

@@ -52,8 +52,8 @@ class Guess(NamedTuple):
 def cos_pennation_of_fibers(length: float, height: float) -> float:
     """Return the cosine of the pennation angle of fibers with a constant height h: sqrt(l² - h²) / l.
 
-    Fibers shorter than their height stand upright; their cosine is `RIGHT_ANGLE_COSINE`, not 0, since laws
-    divide by it.
+    Fibers shorter than their height stand upright; their cosine is `RIGHT_ANGLE_COSINE`, not 0,
+    since laws divide by it.
 
     Args:
         length: fiber length (m).

@@ -40,7 +40,8 @@ class ElementBuilder:
         mechanism: mechanism of the model.
         folder: folder of the model's file.
         early_return: whether to reproduce Simbody's defect in contact of several surfaces.
-        own_activation_times: whether each muscle uses its own activation times (OpenSim's defect shares them).
+        own_activation_times: whether each muscle uses its own activation times; OpenSim's defect
+            shares those of one muscle.
         wrapping: "opensim" or "geodesic".
         rigid_tendons: whether muscles are computed with rigid tendons and without states.
 
@@ -51,7 +52,8 @@ class ElementBuilder:
         reads_files: whether an element has used a file.
         drives: drives of the controllers that were read so far, by the paths of the controllers.
         early_return: whether to reproduce Simbody's defect in contact of several surfaces.
-        own_activation_times: whether each muscle uses its own activation times (OpenSim's defect shares them).
+        own_activation_times: whether each muscle uses its own activation times; OpenSim's defect
+            shares those of one muscle.
         geodesic: whether paths bend around surfaces along geodesics.
         rigid_tendons: whether muscles are computed with rigid tendons and without states.
 

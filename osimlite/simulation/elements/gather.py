@@ -59,7 +59,8 @@ def force_elements(
     Args:
         model: the model.
         mechanism: mechanism of the same model.
-        skip_unsupported: whether forces that cannot be computed are left out; otherwise they raise.
+        skip_unsupported: whether forces that cannot be computed are left out; else they
+            raise an UnsupportedError.
         simbody_early_return: whether Simbody's defect in contact of several surfaces is reproduced.
         own_activation_times: whether each DeGrooteFregly2016Muscle uses its own activation times;
             OpenSim's defect shares those of one muscle.

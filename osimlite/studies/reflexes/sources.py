@@ -50,8 +50,8 @@ class Channel(NamedTuple):
         letter: letter of the channel, for example `L` for the length of a muscle.
         make_source: function that makes its sensor.
         default_offset: offset without a setting.
-        allows_negative: whether the term may be negative without a setting `allow_neg_`; None if SCONE has
-            no such setting for it.
+        allows_negative: whether the term may be negative without a setting `allow_neg_`; None if
+            SCONE has no such setting for it.
     """
 
     letter: str

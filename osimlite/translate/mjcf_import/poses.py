@@ -22,7 +22,7 @@ class SampledPoses:
     Attributes:
         qpos: positions (P, nq).
         sites: places (P, nsite, 3) of the sites, m.
-        geoms: places (P, ngeom, 3) of the geoms, m.
+        geoms: positions (P, ngeom, 3) of the geoms, m.
         rotations: orientations (P, ngeom, 3, 3) of the geoms.
     """
 

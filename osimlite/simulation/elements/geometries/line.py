@@ -59,7 +59,8 @@ def pull_ends(model: Ints, data: Floats, g: Ints, gp: Floats, work: Floats, tens
     # The law reads the direction before; now the record becomes the report.
     apply_force(model, data, g[1], vector(work, 6), back)
     store_vector(work, 0, pull)
-    # OpenSim reports these points in the frames that the force names, and acts at others: see `EndPoints`.
+    # OpenSim reports these points in the frames that the force names, and acts at others: see
+    # `EndPoints`.
     store_vector(work, 3, station(model, data, g[0], vector(gp, 6)))
     store_vector(work, 6, back)
     store_vector(work, 9, station(model, data, g[1], vector(gp, 9)))
