@@ -208,7 +208,7 @@ def _fill_vector(noun: str, names: Sequence[str], default: Array, user_values: A
     elif user_values is not None:
         if len(user_values) != len(names):
             raise SettingError(
-                f"expected {len(names)} values, one for each {noun} of the model; got {len(user_values)}"
+                f"expected {format_count(len(names), 'value')}, one for each {noun} of the model; got {len(user_values)}"
             )
         result[:] = user_values
     return result

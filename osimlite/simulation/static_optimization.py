@@ -496,8 +496,8 @@ class StaticOptimization:
                 if index not in self._free_indices
             ]
             raise UnsupportedError(
-                f"constraints do not determine {join_words(names)}: these coordinates can move while all "
-                "others rest; lock or couple them"
+                f"the constraints leave {join_words(names)} undetermined while all other coordinates rest; "
+                "lock or couple such coordinates"
             )
         # A particular solution of G udot = target, to which motions of the null space are added.
         start = np.linalg.pinv(equations) @ targets

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from osimlite.base.files import make_folder, write_atomically
+from osimlite.base.text import format_count
 from osimlite.errors import OsimliteError, SettingError
 from osimlite.io.b3d.messages import MISSING_FORCE_REASONS, PASS_FIELDS, PASS_TYPES
 from osimlite.io.b3d.reader import read_b3d
@@ -223,7 +224,7 @@ class SubjectFolder:
                     f"{trial_path}/markers",
                     "a marker at the origin of ground, which means that it was not seen",
                     "written as a gap",
-                    f"{int(unseen.sum())} positions",
+                    format_count(int(unseen.sum()), "position"),
                 )
             rows = positions.reshape(len(times), -1)
             write_trc(folder / MARKERS_FILE, times.tolist(), markers, rows)

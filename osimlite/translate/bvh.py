@@ -9,6 +9,7 @@ import numpy as np
 
 from osimlite.base.files import make_folder, open_atomically
 from osimlite.base.records import dataclass
+from osimlite.base.text import format_count
 from osimlite.errors import SettingError
 from osimlite.io.bvh import BvhMotion, format_bvh, read_bvh
 from osimlite.io.tables.writers import write_trc
@@ -104,7 +105,7 @@ def to_bvh(
             "/",
             "frames at unequal times",
             "coordinates interpolated linearly to equal time steps",
-            f"{len(values)} rows became {len(result.motion.values)} frames",
+            f"{format_count(len(values), 'row')} became {format_count(len(result.motion.values), 'frame')}",
         )
     return Bvh(name or mechanism.name or "model", result.motion, fidelity)
 

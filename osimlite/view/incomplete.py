@@ -105,7 +105,7 @@ def describe_errors(findings: Iterable[Finding], parts: Sequence[tuple[str, str]
         lines.append(f"error: {finding.component or 'the document'}: {finding.message}{hint}")
     hidden_count = len(errors) - len(lines)
     return (
-        [*lines, f"{hidden_count} more errors; 'osimlite validate' lists them"]
+        [*lines, f"{format_count(hidden_count, 'more error')}; 'osimlite validate' lists all"]
         if hidden_count
         else lines
     )

@@ -121,7 +121,7 @@ def page_data(
             "name": model.name,
             "facts": f"{format_count(len(mechanism.bodies), 'body')}, "
             f"{format_count(len(mechanism.coordinates), 'coordinate')}, "
-            f"{len(tree)} components",
+            f"{format_count(len(tree), 'component')}",
             "server": server,
             "story": None if story is None else story._asdict(),
             "layers": LAYERS,

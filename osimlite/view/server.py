@@ -176,7 +176,8 @@ def assemble_pose(mechanism: Mechanism, request: bytes) -> dict[str, Any]:
         ) from None
     if len(q) != len(mechanism.coordinates):
         raise _BadRequest(
-            HTTPStatus.BAD_REQUEST, f"the model has {len(mechanism.coordinates)} coordinates"
+            HTTPStatus.BAD_REQUEST,
+            f"expected one value for each coordinate ({len(mechanism.coordinates)}), got {len(q)}",
         )
     if not np.isfinite(q).all():
         return {"error": "a coordinate value is not a number"}

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from osimlite.base.files import make_folder
+from osimlite.base.text import format_count
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.view.panels import COLORS, MAX_COLUMNS, MAX_PANELS, make_figure, write_pages
 
@@ -109,7 +110,7 @@ def _draw_pages(
         row_count = ceil(len(page) / column_count)
         count = f" ({number + 1} of {pages})" if pages > 1 else ""
         size = (1.0 + 3.6 * column_count, 0.7 + 2.8 * row_count)
-        figure = make_figure(f"{len(numbers[page[0][0]])} runs{count}", size)
+        figure = make_figure(f"{format_count(len(numbers[page[0][0]]), 'run')}{count}", size)
         panels_grid = figure.subplots(row_count, column_count, squeeze=False).ravel()
         for panel in panels_grid[len(page) :]:
             panel.remove()

@@ -157,8 +157,8 @@ def _build_custom_motions(
     unused = [name for name in coordinates if name not in order]
     if unused:
         raise ModelError(
-            f"CustomJoint '{path}' has {len(coordinates)} coordinates, but uses only {len(order)}: "
-            f"nothing in its SpatialTransform depends on {join_words(unused)}"
+            f"CustomJoint '{path}' has {format_count(len(coordinates), 'coordinate')}, but nothing in its "
+            f"SpatialTransform depends on {join_words(unused)}; add each to an axis, or remove it"
         )
     motions = make_custom_motions(axes[:3], axes[3:], opensim_derivatives=opensim_derivatives)
     return motions, [coordinates[name] for name in order]

@@ -209,7 +209,7 @@ class MechanismStructure:
         result = np.asarray(values, dtype=float)
         if result.shape != (count,):
             raise ModelError(
-                f"'{self.name}' takes one {quantity} for each of its {count} coordinates, in their order; "
+                f"'{self.name}' takes one {quantity} for each of its coordinates ({count}), in their order; "
                 f"got {_describe_shape(result)}"
             )
         return result

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from osimlite.base.records import dataclass
+from osimlite.base.text import format_count
 from osimlite.errors import ModelError
 from osimlite.io.tables.storage import StoTable
 from osimlite.io.tables.table_stream import TableStream, find_word_start
@@ -98,7 +99,8 @@ def make_column_function(table: StoTable, index: int, degree: int, what: str) ->
         return PiecewiseConstant(tuple(times.tolist()), tuple(values.tolist()))
     if not 1 <= half_order <= 4 or len(times) < 2 * half_order:
         raise ModelError(
-            f"{what} is {degree}, which is impossible with {len(times)} rows; use 0 for steps or 1 for straight lines",
+            f"{what} is {degree}, which is impossible with {format_count(len(times), 'row')}; use 0 for steps "
+            "or 1 for straight lines",
             file=table.file,
         )
     return smoothing_spline(times, values, half_order, 0.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from osimlite.base.text import suggest_name
+from osimlite.base.text import format_count, suggest_name
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.io.tables.storage import find_named_file
 from osimlite.mechanics.multibody.functions import ScaledFunction, SmoothFunction
@@ -73,13 +73,15 @@ def drive_by_synergies(builder: ElementBuilder, controller: SynergyController) -
     for vector in vectors:
         if len(vector.synergy_weights) != len(targets):
             raise ModelError(
-                f"the synergy vector '{vector.name}' of '{path}' has {len(vector.synergy_weights)} weights for "
-                f"{len(targets)} controls; give it one for each"
+                f"the synergy vector '{vector.name}' of '{path}' has "
+                f"{format_count(len(vector.synergy_weights), 'weight')} for {format_count(len(targets), 'control')}; "
+                "give it one for each"
             )
     words = controller.input_controls
     if words and len(words) != len(vectors):
         raise ModelError(
-            f"'{path}' has {len(words)} inputs for {len(vectors)} synergy vectors; give it one for each"
+            f"'{path}' has {format_count(len(words), 'input')} for {format_count(len(vectors), 'synergy vector')}; "
+            "give it one for each"
         )
     for vector, word in zip(vectors, words, strict=False):
         function = read_signal(builder, controller, word)

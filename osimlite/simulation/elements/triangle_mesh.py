@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from osimlite.base.files import read_file
 from osimlite.base.records import dataclass
+from osimlite.base.text import format_count
 from osimlite.errors import ModelError
 from osimlite.io.meshes.folders import MeshFolders
 from osimlite.io.meshes.obj import read_obj_polygons
@@ -136,8 +137,8 @@ class TriangleMesh:
         open_edges = np.count_nonzero(~np.isin(codes, back)) + np.count_nonzero(counts > 1)
         if open_edges:
             raise ModelError(
-                f"the mesh is not a closed surface: at {open_edges} edges, a neighbouring triangle is missing, "
-                "or the two triangles have opposite orientations; repair the mesh in a mesh program",
+                f"the mesh is not a closed surface: at {format_count(int(open_edges), 'edge')}, a neighbouring "
+                "triangle is missing, or the two triangles have opposite orientations; repair the mesh in a mesh program",
                 file=file,
             )
         result = cls(points, triangles)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from osimlite.base.cores import count_cores
-from osimlite.base.text import suggest_name
+from osimlite.base.text import format_count, suggest_name
 from osimlite.errors import OsimliteError, SimulationError
 from osimlite.mechanics.kernels import record
 from osimlite.mechanics.kernels.condensation import CONTACT_NUMBERS
@@ -80,7 +80,7 @@ def run_many(
     count = len(starts)
     if vectors.shape not in ((1, len(engine.numbers)), (count, len(engine.numbers))):
         raise OsimliteError(
-            f"expected an array of {count} rows (one for each run) of {len(engine.numbers)} numbers; got the "
+            f"expected an array of the shape {(count, len(engine.numbers))}, one row for each run; got the "
             f"shape {vectors.shape}"
         )
     kinds, levels = _encode_watches(engine, options.watches)
@@ -88,7 +88,8 @@ def run_many(
     if options.controllers:
         if len(options.controllers) != count:
             raise OsimliteError(
-                f"{len(options.controllers)} controllers are given for {count} runs; give one for each run"
+                f"got {format_count(len(options.controllers), 'controller')} for {format_count(count, 'run')}; "
+                "give one for each run"
             )
         first, *others = options.controllers
         controller_runs = first.make_runs(engine, engine.forces.controls, other_controllers=others)

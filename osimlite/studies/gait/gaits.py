@@ -12,6 +12,7 @@ import numpy as np
 
 from osimlite.base.files import prepare_folder, read_file, write_atomically
 from osimlite.base.records import dataclass
+from osimlite.base.text import format_count
 from osimlite.errors import OsimliteError, SettingError, SimulationError
 from osimlite.io.document.printer import write
 from osimlite.studies.gait.cycle import sample_states_of_step
@@ -240,7 +241,7 @@ def close_candidates(
             break
     if not cycles:
         raise SimulationError(
-            f"none of the {len(candidates)} best random walkers that made two steps leads to a gait cycle; try more "
+            f"no gait cycle was found from {format_count(len(candidates), 'random walker')} that made two steps; try more "
             "walkers (--samples), refine more of the best ones (--tries), or vary other quantities"
         )
     return cycles

@@ -237,7 +237,7 @@ def _resolve_start(
     if not isinstance(start, Mapping):
         if start is not None and len(start) != len(plan.variables):
             raise SettingError(
-                f"the start must have one number for each of the {len(plan.variables)} variables, found {len(start)}"
+                f"the start must have one number for each variable ({len(plan.variables)}), found {len(start)}"
             )
         start = dict(zip((variable.name for variable in plan.variables), start or (), strict=False))
     result = []

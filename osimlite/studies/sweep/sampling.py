@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from osimlite.base.records import dataclass, field
 from osimlite.base.require import require
-from osimlite.base.text import join_words, suggest_or_list
+from osimlite.base.text import format_count, join_words, suggest_or_list
 from osimlite.errors import SettingError
 from osimlite.studies.sweep.variables import Floats, Variable
 
@@ -147,7 +147,7 @@ def choose_samples(
         grid_size = prod(variable.count or 1 for variable in varied_variables)
         if count not in (None, grid_size):
             raise SettingError(
-                f"the grid has {grid_size} points, not {count}; leave out the number of samples"
+                f"the grid has {format_count(grid_size, 'point')}, not {count}; leave out the number of samples"
             )
         return Samples(tuple(variables), sampler, grid_size, seed)
     if count is None:

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from osimlite.base.quantity import Quantity, parse_quantity
 from osimlite.base.records import dataclass, replace
-from osimlite.base.text import suggest_name
+from osimlite.base.text import format_count, suggest_name
 from osimlite.errors import SettingError
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.schema.forces import Actuator
@@ -289,7 +289,7 @@ def reject_grid_ranges(variables: Sequence[Variable]) -> None:
     for variable in variables:
         if variable.count is not None and not variable.is_fixed:
             raise SettingError(
-                f"the range of '{variable.name}' has {variable.count} grid points, but only a sweep "
+                f"the range of '{variable.name}' has {format_count(variable.count, 'grid point')}, but only a sweep "
                 "uses a grid; leave out the number of points"
             )
 

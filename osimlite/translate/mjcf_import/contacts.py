@@ -12,6 +12,7 @@ from itertools import product
 
 import numpy as np
 
+from osimlite.base.text import format_count
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.contact import ContactGeometry
 from osimlite.schema.contact_types import (
@@ -212,7 +213,7 @@ def _add_forces(draft: ConversionDraft, surfaces: dict[int, list[ContactGeometry
             geom,
             "contact with other shapes than planes",
             "contact surfaces without a force",
-            f"{count} other geoms",
+            format_count(count, "other geom"),
         )
 
 

@@ -13,6 +13,7 @@ import math
 import numpy as np
 
 from osimlite.base.named_tuples import NamedTuple
+from osimlite.base.text import format_count
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.custom_joint import CustomJoint, SpatialTransform, TransformAxis
@@ -159,7 +160,7 @@ def add_joints(draft: ConversionDraft, body: int, frame: Body, parent: PhysicalF
             body,
             "joints with different anchors, or a slide after a hinge",
             "several joints, connected by bodies without mass; the motion is the same",
-            f"{len(groups) - 1} helper bodies",
+            format_count(len(groups) - 1, "helper body"),
         )
 
 

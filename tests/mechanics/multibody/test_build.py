@@ -13,6 +13,7 @@ from osimlite.mechanics.multibody.schema_frames import Placements
 from osimlite.mechanics.multibody.spatial import invert_transform, make_offset, make_transform
 from osimlite.schema.base import Unknown
 from osimlite.schema.coordinates import Coordinate
+from osimlite.schema.custom_joint import CustomJoint
 from osimlite.schema.frames import Body, Ground, PhysicalOffsetFrame, StationDefinedFrame
 from osimlite.schema.function_types import ExpressionBasedFunction
 from osimlite.schema.joint_types import BallJoint, FreeJoint
@@ -358,6 +359,11 @@ def _prescribed(model: Model, body: Body, joint: Joint) -> None:
     joint.coordinates[0].prescribed = True
 
 
+def _unused_coordinate(model: Model, body: Body, joint: Joint) -> None:
+    custom = CustomJoint(name="hinge", coordinates=[Coordinate(name="angle")])
+    model.joint_set.objects = [custom.between(model.ground, body)]
+
+
 def _unknown_joint(model: Model, body: Body, joint: Joint) -> None:
     objects: list[Any] = [joint, Unknown(name="odd", class_name="ScrewJoint")]
     model.joint_set.objects = objects
@@ -435,6 +441,11 @@ def _no_inertia(model: Model, body: Body, joint: Joint) -> None:
             _prescribed,
             UnsupportedError,
             "of '/jointset/hinge/hinge_0' is an ExpressionBasedFunction",
+        ),
+        (
+            _unused_coordinate,
+            ModelError,
+            "'/jointset/hinge' has 1 coordinate, but nothing .* depends on angle; add each to an axis",
         ),
         (_unknown_joint, UnsupportedError, "'/jointset/odd' is a ScrewJoint.*PinJoint"),
         (_misspelt_joint, UnsupportedError, "did you mean 'PinJoint'"),

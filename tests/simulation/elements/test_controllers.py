@@ -111,12 +111,12 @@ def synergies(inputs, weights) -> SynergyController:
         (
             ("/wave|signal",),
             (1.0, 2.0),
-            "the synergy vector 'v' of '/controllerset/brain' has 2 weights for 1 controls; give it one for each",
+            "the synergy vector 'v' of '/controllerset/brain' has 2 weights for 1 control; give it one for each",
         ),
         (
             ("/wave|signal", "/wave|signal"),
             (1.0,),
-            "'/controllerset/brain' has 2 inputs for 1 synergy vectors; give it one for each",
+            "'/controllerset/brain' has 2 inputs for 1 synergy vector; give it one for each",
         ),
         (
             ("/waves|signal",),

@@ -279,7 +279,7 @@ def test_what_cannot_be_is_said(made, walker, tmp_path):
         ("tolerance must be", {"tolerance": -1.0}),
         ("tolerance must be", {"tolerance": float("nan")}),
         ("outside 0.2 to 0.9", {"start": [5.0, 0.0, 1.0]}),
-        ("one number for each of the 3", {"start": [5.0]}),
+        (r"one number for each variable \(3\)", {"start": [5.0]}),
         ("stays within", {"method": "differential-evolution", "is_bounded": False}),
     ]:
         with pytest.raises(SettingError, match=words):

@@ -13,6 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from osimlite.base.records import dataclass, replace
+from osimlite.base.text import format_count
 from osimlite.errors import ModelError
 from osimlite.mechanics.kernels.cable_surfaces import SURFACE_TYPE
 from osimlite.mechanics.kernels.geodesic_paths import layout_slots
@@ -259,7 +260,7 @@ def read_path(builder: ElementBuilder, owner: Any) -> ThroughPoints:
         points.append(READERS[type(point)](builder, point, body, frame))
     if len(points) < 2:
         raise ModelError(
-            f"the path of '{builder.path(owner)}' has {len(points)} points; give it at least two"
+            f"the path of '{builder.path(owner)}' has {format_count(len(points), 'point')}; give it at least two"
         )
     wraps = path.path_wrap_set.objects
     result = [builder.resolve_target(wrap, "wrap_object", wrap.wrap_object) for wrap in wraps]

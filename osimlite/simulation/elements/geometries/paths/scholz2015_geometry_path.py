@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from osimlite.base.records import dataclass, replace
+from osimlite.base.text import add_article
 from osimlite.errors import ModelError, OsimliteError, UnsupportedError
 from osimlite.mechanics.kernels.cable_correction import solver_size
 from osimlite.mechanics.kernels.cable_records import (
@@ -335,8 +336,8 @@ def _read_obstacle(builder: ElementBuilder, owner: Any, item: Any) -> CableObsta
     if surface is None:
         # OpenSim asks each obstacle for the equation of its surface, which meshes do not have.
         raise ModelError(
-            f"the obstacle '{geometry.name}' of the path of '{builder.path(owner)}' is a "
-            f"{get_class_name(geometry)}, which osimlite does not support as an obstacle; use a sphere, cylinder, "
+            f"the obstacle '{geometry.name}' of the path of '{builder.path(owner)}' is "
+            f"{add_article(get_class_name(geometry))}, which osimlite does not support as an obstacle; use a sphere, cylinder, "
             "ellipsoid, torus or half-space"
         )
     builder.check_finite(geometry, (*surface, *geometry.location, *geometry.orientation))
