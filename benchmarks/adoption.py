@@ -29,6 +29,7 @@ from typing import Any
 import numpy as np
 
 from osimlite.base.files import TABLE_SUFFIXES
+from osimlite.base.text import format_count
 from osimlite.lint import Config, Finding
 from osimlite.lint.many import check_files
 from osimlite.lint.project_files import find_project_files
@@ -258,11 +259,13 @@ def check_patch(
     effect = (
         "OpenSim reads the same"
         if is_unchanged
-        else f"OpenSim reads {line_count} lines and {number_count} numbers differently"
+        else f"OpenSim reads {format_count(line_count, 'line')} and "
+        f"{format_count(number_count, 'number')} differently"
     )
     contradiction = "" if is_right else ", WHICH THE PATCH DOES NOT SAY"
     print(
-        f"{patch.name}: {len(files)} files, {format_counts(change, '+d')}; {effect}{contradiction}"
+        f"{patch.name}: {format_count(len(files), 'file')}, {format_counts(change, '+d')}; "
+        f"{effect}{contradiction}"
     )
     return new_findings, is_right
 

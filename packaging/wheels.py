@@ -131,7 +131,7 @@ def check_library(content: bytes, platform: str) -> list[str]:
         if not re.search(rb"(?<![A-Za-z0-9])" + name.encode() + rb"\0", content)
     ]
     if missing:
-        problems.append(f"{len(missing)} kernels are not in it, such as {missing[0]}")
+        problems.append(f"it lacks {len(missing)} of {len(names)} kernels, such as {missing[0]}")
     return problems
 
 

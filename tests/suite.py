@@ -176,4 +176,5 @@ def _mark_cases(config: pytest.Config, items: list[pytest.Item]) -> None:
 
 
 def _describe(count: int) -> list[str]:
-    return [f"{count} tests of the full suite are left out; {HOW}"] if count else []
+    tests = "1 test of the full suite is" if count == 1 else f"{count} tests of the full suite are"
+    return [f"{tests} left out; {HOW}"] if count else []
