@@ -292,11 +292,12 @@ def _describe_run(trajectory: Trajectory, files: Sequence[Path], model: Model) -
     )
     facts.add("time taken", f"{summary['wall_time_s']:.3g} s")
     lengths = {path for path in trajectory.auxiliary if path.endswith("/fiber_length")}
-    # Fiber lengths that were neither given nor equilibrated make forces jump at the start.
+    # Fiber lengths of a file may be in equilibrium, as those of the built-in jumper, or not: then
+    # forces jump at the start.
     if lengths - set(summary["settings"]["initial"]) and "equilibrate" not in summary["settings"]:
         facts.add(
-            "warning",
-            "muscles start with the model's states, not in equilibrium; add --equilibrate",
+            "note",
+            "muscles start with the fiber lengths in the file; if these are not in equilibrium, add --equilibrate",
         )
     # A misspelt <stiffness> leaves the default, 0. OpenSim then computes NaN.
     if soft := _find_soft_contacts(model):

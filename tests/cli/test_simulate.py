@@ -14,6 +14,7 @@ import pytest
 
 import osimlite
 from osimlite.errors import OsimliteError
+from osimlite.models.jumper import jumper
 from osimlite.schema.actuators import CoordinateActuator
 from osimlite.simulation import read_sto, write_sto
 from osimlite.simulation.engines import engine_name
@@ -313,6 +314,15 @@ def test_auto_is_a_deprecated_name_of_the_default():
     assert engine_name() == "compiled"
     with pytest.warns(DeprecationWarning, match="leave it out, or select 'bullet'"):
         assert engine_name("auto") == "compiled"
+
+
+def test_muscles_that_start_in_equilibrium_are_not_called_otherwise(tmp_path):
+    osimlite.write(jumper(), tmp_path / "jumper.osim")
+    words = "simulate", "jumper.osim", "--to", "0.001", "-o", "r"
+    out = " ".join(run(*words, folder=tmp_path).out.split())
+    assert "muscles start with the fiber lengths in the file; if these are not" in out
+    assert "note " in out and "warning" not in out
+    assert "in equilibrium" not in run(*words, "--equilibrate", folder=tmp_path).out
 
 
 @pytest.fixture
