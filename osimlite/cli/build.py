@@ -74,14 +74,16 @@ def build(
         )
     make_folder_of(target)
     write(model, target, numbers=style)
-    count = sum(1 for _ in model.components())
+    # As `osimlite info` counts: without the components that OpenSim adds itself.
+    tree = model.tree()
+    count = sum(not tree.is_internal(component) for component in tree.components)
     warning_count = len(report.warnings)
     advice = (
         f"; {format_count(warning_count, 'warning')}: see osimlite validate {target}"
         if warning_count
         else ""
     )
-    say(f"{target}: {count} components{advice}")
+    say(f"{target}: {format_count(count, 'component')}{advice}")
     for path in write_companion_files(source, model, target):
         say(f"wrote {path}")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,10 @@ def test_build_writes_the_walker(tmp_path: Path) -> None:
     code, out, _ = run("build", "dynamic-walker", folder=tmp_path)
     assert code == 0 and "DynamicWalkerModel.osim" in out
     assert osimlite.read(tmp_path / "DynamicWalkerModel.osim").name == "DynamicWalkerModel"
+    # Both commands count the components of the file, without those that OpenSim adds itself.
+    (count,) = re.findall(r"(\d+) components", out)
+    info = run("info", "DynamicWalkerModel.osim", folder=tmp_path).out
+    assert re.search(rf"^components +{count} in the file$", info, re.MULTILINE)
 
 
 def test_build_lists_models_and_takes_parameters(tmp_path: Path) -> None:
