@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 
 from osimlite.base.syntax_trees import parse_expression
-from osimlite.base.text import suggest_name
+from osimlite.base.text import suggest_name, suggest_or_list
 from osimlite.errors import SettingError
 from osimlite.simulation.link_motion import Moments, locate_mass_centers, locate_station
 from osimlite.simulation.run_report import compute_probe_rows, list_probe_labels
@@ -77,7 +77,7 @@ class ExpressionMeasure:
         names: quantities that the expression uses.
 
     Raises:
-        SettingError: the text is no expression, or names an unknown quantity.
+        SettingError: the text is no expression, or names an unknown quantity or function.
     """
 
     def __init__(self, text: str, engine: Any) -> None:
@@ -93,6 +93,11 @@ class ExpressionMeasure:
         def replace_name(match: re.Match[str]) -> str:
             if match["call"] or match["number"]:
                 return match[0]
+            if match["word"] and text[match.end() :].lstrip().startswith("("):
+                functions = [*REDUCTIONS, *FUNCTIONS]
+                raise SettingError(
+                    f"the measure '{text}' calls the unknown function '{match[0]}'{suggest_or_list(match[0], functions)}"
+                )
             if match["word"]:
                 raise SettingError(
                     f"the measure '{text}' names the unknown quantity '{match[0]}'{suggest_name(match[0], quantities)}"

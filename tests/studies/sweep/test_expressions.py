@@ -157,7 +157,8 @@ def test_a_run_that_is_stopped_is_looked_at_up_to_its_end(walker):
         ("max(x" + "+x" * 300 + ")", "nests more than 200 levels deep; write it shorter"),
         ("max(x, 1)", "is not a valid expression; it may contain"),
         ("(1, 2)", "is not a valid expression; it may contain"),
-        ("open(1)", "the unknown quantity 'open'"),
+        ("open(1)", "the unknown function 'open'; expected start, end, max"),
+        ("maxx (x)", "calls the unknown function 'maxx'; did you mean 'max'?"),
         ("max(x)[0]", "is not a valid expression; it may contain"),
     ],
 )
