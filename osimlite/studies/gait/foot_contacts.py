@@ -84,6 +84,11 @@ def find_footing(engine: BatchEngine, feet: Sequence[str] | None = None) -> Foot
         )
         requested = [contact for foot in named_feet for contact in foot]
         for contact in requested:
+            if contact not in engine.contacts:
+                raise OsimliteError(
+                    f"'{engine.mechanism.name}' has no contact force '{contact}'"
+                    f"{suggest_or_list(contact, sole_contacts or engine.contacts)}"
+                )
             if contact not in sole_contacts:
                 raise OsimliteError(
                     f"no sphere touches a half space in '{contact}'"

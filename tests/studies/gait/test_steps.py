@@ -52,6 +52,8 @@ def test_feet_may_be_given(engine):
     )
     with pytest.raises(OsimliteError, match="'RFotForce'; did you mean 'RFootForce'"):
         find_footing(engine, ["RFotForce", "LFootForce"])
+    with pytest.raises(OsimliteError, match="has no contact force 'foo'; expected RHipForce"):
+        find_footing(engine, ["foo", "LFootForce"])
     with pytest.raises(OsimliteError, match="two feet"):
         find_footing(engine, ["RFootForce"])
     for feet in (["RFootForce", "RFootForce"], ["RFootForce", "LFootForce + RFootForce"]):
