@@ -20,6 +20,22 @@ _OF_INPUT = Reference("socket", "Component")
 """Reference by which the text of an input names a component, before the bar and the output."""
 
 
+def describe_illegal_name(name: str) -> str:
+    """Return why a component cannot have a name, as ``"it has a blank"``; "" if it can."""
+    if not name:
+        return "it is empty"
+    characters = [
+        _CHARACTER_NAMES.get(character, f"'{character}'")
+        for character in dict.fromkeys(name)
+        if character in ILLEGAL_CHARACTERS
+    ]
+    return f"it has {join_words(characters)}" if characters else ""
+
+
+_CHARACTER_NAMES = {" ": "a blank", "\t": "a tab", "\n": "a line break"}
+"""Names of the illegal characters that cannot be seen."""
+
+
 def rename_component(model: Model, component: Component, name: str) -> None:
     """Rename a component, and rewrite every reference to it or to components below it.
 
@@ -36,10 +52,8 @@ def rename_component(model: Model, component: Component, name: str) -> None:
     """
     tree = model.tree()
     path = _get_path(model, component)
-    if not name or any(character in name for character in ILLEGAL_CHARACTERS):
-        raise ModelError(
-            f"'{name}' is not a legal name of a component: it is empty, or has a blank, '/', '\\', '*' or '+'"
-        )
+    if reason := describe_illegal_name(name):
+        raise ModelError(f"'{name}' is not a legal name of a component: {reason}")
     parent = tree.parent_of(component)
     new_path = f"{'' if parent is None else path.rsplit('/', 1)[0]}/{name}"
     occupant = tree.by_path.get(new_path)

@@ -49,8 +49,13 @@ def test_references_follow_a_new_name(walker: Model, path: str) -> None:
 
 def test_names_that_cannot_be(walker: Model) -> None:
     body = walker["/bodyset/Pelvis"]
-    for name in ("", "a b", "a/b", "a*b"):
-        with pytest.raises(ModelError, match="not a legal name"):
+    for name, reason in (
+        ("", "it is empty"),
+        ("a b", "it has a blank"),
+        ("a/b", "it has '/'"),
+        ("a b/c d*", r"it has a blank, '/' and '\*'"),
+    ):
+        with pytest.raises(ModelError, match=f"not a legal name of a component: {reason}$"):
             walker.rename(body, name)
     with pytest.raises(ModelError, match="has a 'RightThigh' already"):
         walker.rename(body, "RightThigh")

@@ -17,8 +17,8 @@ from osimlite.errors import ModelError, OsimliteError
 from osimlite.io.document.source import Source
 from osimlite.lint.neighbours import list_documents, list_folders
 from osimlite.schema.base import Component
-from osimlite.schema.editing import rename_component
-from osimlite.schema.resolution import ILLEGAL_CHARACTERS, get_last_name
+from osimlite.schema.editing import describe_illegal_name, rename_component
+from osimlite.schema.resolution import get_last_name
 
 
 class Project:
@@ -188,8 +188,8 @@ class Project:
         if defining.document is not None and defining.document.model is not None:
             path, edits = _compute_model_edits(defining, component, name)
         else:
-            if not name or any(character in name for character in ILLEGAL_CHARACTERS):
-                raise ModelError(f"'{name}' is not a legal name")
+            if reason := describe_illegal_name(name):
+                raise ModelError(f"'{name}' is not a legal name: {reason}")
             edits = _compute_setup_edits(defining, target, path)
         # The name itself first, then all references.
         edits.insert(0, types.TextEdit(defining.text.range(*name_range), name))
