@@ -47,15 +47,17 @@ def open_file(path: str | Path) -> BinaryIO:
 
 
 def make_missing_error(path: str | Path, *, may_be_folder: bool = False) -> MissingFileError:
-    """Return the error for a missing path: a missing folder if the path ends like one, else a file.
+    """Return the error for a missing path, by the end of its name: a folder, a file, or either.
 
     Args:
         path: path that does not exist.
-        may_be_folder: whether a path without suffix means a folder.
+        may_be_folder: whether a path without suffix can mean a folder.
     """
     path_text = str(path)
-    if path_text.endswith(("/", os.sep)) or (may_be_folder and not os.path.splitext(path_text)[1]):
+    if path_text.endswith(("/", os.sep)):
         return MissingFolderError("the folder does not exist; check its name", file=path_text)
+    if may_be_folder and not os.path.splitext(path_text)[1]:
+        return MissingFolderError("no such file or folder; check its name", file=path_text)
     return MissingFileError("cannot read the file: no such file", file=path_text)
 
 

@@ -113,14 +113,22 @@ def test_what_is_passed_over_is_counted_and_named(tmp_path, monkeypatch, capsys)
     assert "skipped" not in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("path", ["nowhere", "nowhere/", "no.where/", "./a/b"])
+@pytest.mark.parametrize(
+    ("path", "message"),
+    [
+        ("nowhere", "no such file or folder"),
+        ("./a/b", "no such file or folder"),
+        ("nowhere/", "the folder does not exist"),
+        ("no.where/", "the folder does not exist"),
+    ],
+)
 @pytest.mark.parametrize("command", ["validate", "format"])
-def test_a_folder_that_is_not_there_is_called_one(tmp_path, monkeypatch, capsys, command, path):
+def test_a_path_that_is_not_there(tmp_path, monkeypatch, capsys, command, path, message):
     monkeypatch.chdir(tmp_path)
     assert main_code(command, path) == 2
     assert (
         capsys.readouterr().err
-        == f"osimlite: {path}: the folder does not exist; check its name (see docs/errors.md#folders)\n"
+        == f"osimlite: {path}: {message}; check its name (see docs/errors.md#folders)\n"
     )
 
 
