@@ -37,6 +37,16 @@ def project(fixtures, tmp_path, monkeypatch):
     return folder
 
 
+def test_findings_call_a_study_a_study(project):
+    path = project / "markers.omoco"
+    text = path.read_text().replace(
+        "</MocoCas", "<num_mesh_intervals>-5</num_mesh_intervals></MocoCas"
+    )
+    path.write_text(text)
+    (finding,) = validate(path, select="OSIM206").findings
+    assert finding.message.endswith(": OpenSim rejects the study")
+
+
 def test_a_folder_is_checked_as_a_whole(project, capsys):
     (project / "leg_no_knee.mot").unlink()
     (project / "leg_degrees.mot").unlink()

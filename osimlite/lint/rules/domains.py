@@ -98,7 +98,8 @@ def report_not_finite(subject: Subject, report: FindingCollector) -> None:
         if non_finite:
             consequence = _describe_nan_consequence(subject, item, spec, non_finite[0])
             report(
-                f"{subject.describe_property(item, spec)} is {format_value(value)}: {consequence}",
+                f"{subject.describe_property(item, spec)} is {format_value(value)}: "
+                f"{_describe_for_document(subject, consequence)}",
                 item,
                 tag=spec.tag,
                 word=_find_word(subject, item, spec, non_finite[0]),
@@ -123,6 +124,15 @@ def _describe_nan_consequence(
     if number != number and spec.name in _NAN_REFUSED.get(type(item).__name__, "").split():
         return REFUSED
     return UNUSED if is_unused(subject, item) else _NAN_CONSEQUENCE
+
+
+def _describe_for_document(subject: Subject, consequence: str) -> str:
+    """Return a consequence with the noun of the document in place of "the model", if it is another."""
+    if subject.top is None or subject.model is not None:
+        return consequence
+    tag = type(subject.top).tag
+    noun = "study" if tag == "MocoStudy" else "setup" if tag.endswith("Tool") else "file"
+    return consequence.replace("rejects the model", f"rejects the {noun}")
 
 
 def _is_older_list(kind: object) -> bool:
@@ -468,7 +478,7 @@ def _report_domain(
     if verdict.number != verdict.number:
         report(
             f"{subject.describe_property(item, spec)} is missing and has no default: "
-            f"{verdict.consequence}",
+            f"{_describe_for_document(subject, verdict.consequence)}",
             item,
             consequence=_DECLARED_CONSEQUENCES.get(verdict.consequence),
             tag=spec.tag,
@@ -486,7 +496,9 @@ def _report_domain(
         .replace(">", "more than")
         .replace("!=", "a number other than")
     )
-    consequence = f": {verdict.consequence}" if verdict.consequence else ""
+    consequence = (
+        f": {_describe_for_document(subject, verdict.consequence)}" if verdict.consequence else ""
+    )
     report(
         f"{subject.describe_property(item, spec)} is {size}, expected {domain_text}{consequence}",
         item,
