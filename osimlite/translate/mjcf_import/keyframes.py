@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from osimlite.base.text import suggest_name
+from osimlite.base.text import join_words, suggest_name
 from osimlite.errors import SettingError
 from osimlite.translate.mjcf_import.coordinate_map import CoordinateMap
 from osimlite.translate.mjcf_import.draft import ConversionDraft
@@ -16,10 +16,8 @@ def add_keyframes(draft: ConversionDraft) -> None:
     names = [draft.source.name_of("key", key) for key in range(model.nkey)]
     requested = draft.options.keyframe
     if requested is not None and requested not in names:
-        known_names = f"; it has {', '.join(names)}" if names else "; it has no keyframes"
-        raise SettingError(
-            f"--keyframe: the file has no keyframe '{requested}'{suggest_name(requested, names)}{known_names}"
-        )
+        hint = suggest_name(requested, names) or f"; it has {join_words(names) or 'no keyframes'}"
+        raise SettingError(f"the file has no keyframe '{requested}'{hint}")
     if not names:
         return
     coordinates = CoordinateMap.build(model, draft.coordinates, draft.rotors)

@@ -44,8 +44,9 @@ def test_the_keyframe_is_the_default_pose(mechanism):
     made = osimlite.from_mjcf(mechanism, keyframe="high")
     assert made.model["/jointset/trunk_joint/root_tz"].default_value == 2.0
     assert "lift\tturn" in made.files["model_keyframes.mot"]
-    with pytest.raises(OsimliteError, match="it has high"):
-        osimlite.from_mjcf(mechanism, keyframe="low")
+    for name, hint in (("low", "; it has high"), ("hig", r"; did you mean 'high'\?")):
+        with pytest.raises(OsimliteError, match=f"^the file has no keyframe '{name}'{hint}$"):
+            osimlite.from_mjcf(mechanism, keyframe=name)
 
 
 def test_springs_and_dampers_are_exact(mechanism):
