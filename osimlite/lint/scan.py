@@ -115,7 +115,8 @@ _MAX_SAMPLED_NUMBERS = 200_000
 # as missing here.
 _PLAIN = compile_later(rb"[-+]?(\d+(?:\.\d*)?|\.\d+)([eE][-+]?\d+)?")
 # Exponents from 100 on: the number may be beyond the largest one, which C++ does not read.
-_LARGE_EXPONENT = compile_later(rb"[eE]\+?0*[1-9]\d\d")
+_LARGE_EXPONENT = compile_later(rb"e\+?[1-9]\d\d")
+_LARGE_CAPITAL_EXPONENT = compile_later(rb"E\+?[1-9]\d\d")
 _WORD = compile_later(rb"\S+")
 _LETTER = compile_later(rb"[A-Za-z]")
 # A line with a digit, NaN or infinity is taken for a row, even if it has letters as well.
@@ -171,10 +172,10 @@ class RowScanner:
                 # "!" sends it to the examination cell by cell.
                 else (b"!\n" * len(lines), False)
             )
-            if _LARGE_EXPONENT.search(block):
+            if _may_overflow(block):
                 forms = shapes.split(b"\n")
                 shapes = b"".join(
-                    (b"!" if _LARGE_EXPONENT.search(text) else form) + b"\n"
+                    (b"!" if _may_overflow(text) else form) + b"\n"
                     for text, form in zip(lines, forms, strict=False)
                 )
             # The usual case: a block of rows of plain numbers is recognised by one comparison.
@@ -544,6 +545,15 @@ def _split_blocks(data: bytes, start: int) -> Iterator[bytes]:
         block = data[start:end]
         yield block if block.endswith(b"\n") else block + b"\n"
         start = end
+
+
+def _may_overflow(text: bytes) -> bool:
+    """Return whether a text may have a number beyond the largest one."""
+    # Two expressions that begin with a letter are three times faster than one with both letters.
+    return any(
+        letter in text and expression.search(text) is not None
+        for letter, expression in ((b"e", _LARGE_EXPONENT), (b"E", _LARGE_CAPITAL_EXPONENT))
+    )
 
 
 def parse_number(cell: bytes) -> float:
