@@ -54,7 +54,9 @@ def describe_unit_mistake(name: str, value: Quantity | None, range: tuple[float,
     if low <= value.number <= high:
         return ""
     number = f"{value.number:g}"
-    return f"{name} = {number} is in rad, and outside its range of {low:.3g} to {high:.3g} rad; did you mean {number}deg?"
+    in_range = low <= math.radians(value.number) <= high
+    advice = f"did you mean {number}deg?" if in_range else f"write {number}deg for degrees"
+    return f"{name} = {number} is in rad, and outside its range of {low:.3g} to {high:.3g} rad; {advice}"
 
 
 def warn_of_unit(message: str) -> None:

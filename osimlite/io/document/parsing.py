@@ -113,7 +113,7 @@ def _make_syntax_error(source: Source, line: int, column: int, message: str) -> 
     line, column, _ = locate_error(source, line, column, message)
     words = rephrase_message(message) if "<" in source.text else "there is no element in it"
     if source.file is not None and source.file.lower().endswith(TABLE_SUFFIXES):
-        words += "; the commands 'validate', 'info' and 'diff' accept tables"
+        words += "; the commands 'validate' and 'info' accept tables, and 'diff' those of two .sto or .mot files"
     return NotWellFormedError(
         f"not well-formed XML: {words}", file=source.file, line=line, column=column
     )

@@ -130,8 +130,12 @@ class Fold(NamedTuple):
             )
             result.append(f"{len(self.more)} more like this{line_list}")
         if self.in_other_files:
+            paths = [finding.file or "" for finding in self.in_other_files]
+            folder = os.path.dirname(self.first.file or "")
+            # Files of other folders may have the same name.
             files = dict.fromkeys(
-                os.path.basename(finding.file or "") for finding in self.in_other_files
+                os.path.basename(path) if os.path.dirname(path) == folder else path
+                for path in paths
             )
             result.append(
                 f"{len(self.in_other_files)} more in other files: {join_words(files, max_count=3)}"

@@ -233,8 +233,9 @@ def report_load_place(setup: Setup, report: FindingCollector) -> None:
         if math.hypot(*mean_force) > max(0.5 * mass * weight, 2.0 * lift):
             report(
                 f"the mean sum of these forces is {math.hypot(*mean_force):.0f} N "
-                f"({', '.join(f'{n:.0f}' for n in mean_force)}), which does not point up: are their "
-                "axes or signs wrong?",
+                f"({', '.join(f'{n:.0f}' for n in mean_force)}), which does not point up, against the "
+                f"model's gravity ({', '.join(f'{n:g}' for n in model.gravity)}): are their axes or signs "
+                "wrong, or is the gravity?",
                 loads,
                 tag="datafile",
             )

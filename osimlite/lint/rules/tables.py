@@ -469,7 +469,7 @@ table.
 - hip→time→knee
 + time→hip→knee
 07 blanks-between-labels, warning, in newer: Blanks separate the labels of a table of version 2 or 3. Newer tools of
-OpenSim's reject it.
+OpenSim reject such a table.
 - time hip knee
 + time→hip→knee
 08 label-twice, warning, in old: Two columns have one label. OpenSim finds only the first by its label; for markers it
