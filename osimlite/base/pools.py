@@ -6,6 +6,7 @@ import logging
 import signal
 import sys
 import time
+import warnings
 from collections.abc import Callable, Iterator
 from concurrent.futures import (
     BrokenExecutor,
@@ -21,7 +22,7 @@ from typing import Any, Protocol
 import osimlite
 from osimlite.base.cores import count_cores
 from osimlite.base.require import protect_processes, require
-from osimlite.errors import OsimliteError, SettingError
+from osimlite.errors import DoubtfulWarning, OsimliteError, ResultWarning, SettingError
 
 MAX_TASK_LOSSES = 20
 """Largest number of times that a task is submitted again after its worker was lost."""
@@ -180,7 +181,7 @@ class ProcessPool(LocalPool):
     def __init__(self, work: Callable[[Any], Any], count: int) -> None:
         protect_processes()
         # Windows can wait for 61 processes at most. Ctrl-C is for the main process only.
-        executor = ProcessPoolExecutor(min(count, 61), get_context("spawn"), _ignore_interrupts)
+        executor = ProcessPoolExecutor(min(count, 61), get_context("spawn"), _prepare_worker)
         super().__init__(executor, work, count)
 
 
@@ -326,9 +327,25 @@ def _get_from_queue(queue: SimpleQueue[Any], timeout: float | None) -> Any:
         raise TimeoutError from None
 
 
-def _ignore_interrupts() -> None:
-    """Ignore Ctrl-C in this process."""
+def _prepare_worker() -> None:
+    """Ignore Ctrl-C in this process, and print warnings of osimlite as the commands do."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # The main process shows the messages of results.
+    warnings.simplefilter("ignore", ResultWarning)
+    format_other_warning = warnings.formatwarning
+
+    def format_warning(
+        message: Warning | str,
+        category: type[Warning],
+        filename: str,
+        lineno: int,
+        line: str | None = None,
+    ) -> str:
+        if issubclass(category, DoubtfulWarning):
+            return f"osimlite: {message}\n"
+        return format_other_warning(message, category, filename, lineno, line)
+
+    warnings.formatwarning = format_warning
 
 
 @contextmanager

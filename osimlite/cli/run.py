@@ -110,13 +110,17 @@ def run(
 
     Example: osimlite run scale.xml 'trials/*/ik.xml' 'trials/*/id.xml' --workers 4
     """
+    import warnings
+
     from osimlite.base.files import expect_folder_of
     from osimlite.cli._progress import progress_bar
     from osimlite.cli._recorded import require_plots
-    from osimlite.errors import SettingError
+    from osimlite.errors import ResultWarning, SettingError
     from osimlite.tools.many import assign_folders, find_setups, run_many
     from osimlite.tools.named_files import find_inputs
 
+    # The messages of each outcome contain these warnings.
+    warnings.simplefilter("ignore", ResultWarning)
     require_plots(plot=plot)
     files = find_setups(setups)
     for option in (["--report"] if report is not None else []) + (["--plot"] if plot else []):
@@ -212,17 +216,14 @@ def _run_alone(
 ) -> Outcome:
     """Run a setup, print its messages, and return its outcome."""
     import sys
-    import warnings
 
     from osimlite.cli._console import complain, say
     from osimlite.cli._progress import progress_bar
-    from osimlite.errors import DocumentError, ResultWarning
+    from osimlite.errors import DocumentError, OsimliteError
     from osimlite.lint.diagnostic import Report
     from osimlite.tools.running import FaultySetup
     from osimlite.tools.running import run as run_setup
 
-    # The summary of the outcome contains these warnings.
-    warnings.simplefilter("ignore", ResultWarning)
     try:
         with progress_bar("running", None) as advance:
             outcome = run_setup(
@@ -245,6 +246,10 @@ def _run_alone(
         _show_findings(Report(errors, fault.report.texts))
         errors_text = "this error" if len(errors) == 1 else "these errors"
         raise DocumentError(f"did not run because of {errors_text}", file=str(setup)) from None
+    except OsimliteError as error:
+        # As for several setups: the setup could not run, also if the reason is in the model.
+        complain(error)
+        raise SystemExit(2) from None
     _print_outcome(setup, outcome)
     # Ipopt's status after Ctrl-C.
     if outcome.summary.get("status") == "User_Requested_Stop":
