@@ -46,10 +46,11 @@ def ik(
     Example: osimlite ik gait2392.osim walk.trc --weight RASI=10 -o results
     """
     from osimlite.base.files import make_folder, write_atomically
-    from osimlite.base.text import join_words
+    from osimlite.base.text import join_words, suggest_or_list
     from osimlite.cli._console import say
     from osimlite.cli._progress import progress_bar
     from osimlite.cli._recorded import draw_tables, require_plots
+    from osimlite.errors import SettingError
     from osimlite.fitting.fit_messages import NO_EFFECT, describe_fit, describe_unknown
     from osimlite.fitting.ik_tool import create_motion_table
     from osimlite.fitting.inverse_kinematics import inverse_kinematics
@@ -58,6 +59,7 @@ def ik(
     from osimlite.io.document.reader import read
     from osimlite.io.tables.old_storage import UNITS, format_old_table
     from osimlite.io.tables.storage import StoTable, write_sto
+    from osimlite.schema.coordinates import Coordinate
     from osimlite.schema.markers import Marker
 
     require_plots(plot=plot)
@@ -65,6 +67,13 @@ def ik(
     coordinate_weights = options.parse_named_numbers(keep, "--keep")
     of_sensors = holds_orientations(trial)
     model = read(file)
+    coordinate_names = {coordinate.name for coordinate in model.components(Coordinate)}
+    for name in coordinate_weights:
+        # A path leads to one coordinate, too.
+        if name.rpartition("/")[2] not in coordinate_names:
+            raise SettingError(
+                f"--keep: '{model.name}' has no coordinate '{name}'{suggest_or_list(name, sorted(coordinate_names))}"
+            )
     data = None if of_sensors else MarkerData.from_source(trial)
     with progress_bar("fitting the motion", None):
         motion = inverse_kinematics(

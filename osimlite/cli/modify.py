@@ -64,7 +64,7 @@ def modify(
     from osimlite.base.files import make_folder_of
     from osimlite.base.text import format_count
     from osimlite.cli._console import add_row, create_table, print_table, say
-    from osimlite.errors import DocumentError, SettingError
+    from osimlite.errors import DocumentError, ModelError, SettingError
     from osimlite.fitting.modifying.operators import process_model
     from osimlite.fitting.modifying.words import find_change
     from osimlite.io.document.printer import write
@@ -109,7 +109,11 @@ def modify(
     summaries = []
     for assignment, apply_change in changes:
         before = model.copy_deep()
-        fitted += apply_change(model, file.parent) or []
+        try:
+            fitted += apply_change(model, file.parent) or []
+        except ModelError as error:
+            # The model lacks a part that the option names.
+            raise SettingError(f"--replace {assignment}: {error.message}") from None
         summary = _summarize_differences(find_differences(before, model))
         summaries.append(f"{assignment}: {summary}")
     target = output or file.with_name(f"{file.stem}_modified.osim")

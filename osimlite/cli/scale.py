@@ -88,6 +88,8 @@ def scale(
     subject_mass = options.resolve_mass(mass)
     if not (measurements or factors or place or mass is not None):
         raise SettingError("there is nothing to scale; add --distance, --factor, --mass or --place")
+    if static is not None and not (measurements or place):
+        raise SettingError(f"'{static}' has no effect; add --distance or --place, or leave it out")
     with progress_bar("scaling", None):
         model = read(file)
         # A setup may name markers that the model lacks, as in OpenSim; here it is a spelling error.

@@ -60,7 +60,10 @@ def test_a_trial_is_fitted(lab: Path) -> None:
             ("ik", "box.osim", "walk.trc", "--weight", "one=much"),
             "'much' is not a number for 'one'",
         ),
-        (("ik", "box.osim", "walk.trc", "--keep", "knee=1"), "no coordinate 'knee'"),
+        (
+            ("ik", "box.osim", "walk.trc", "--keep", "knee=1"),
+            "--keep: 'box' has no coordinate 'knee'",
+        ),
         (("ik", "box.osim", "walk.trc", "--from", "7"), "no frame of 'walk.trc' lies after"),
         (("ik", "box.osim", "none.trc"), "none.trc: cannot read the file"),
         (("ik", "box.osim", "box.osim"), "this is not a marker file"),
@@ -76,6 +79,7 @@ def test_a_trial_is_fitted(lab: Path) -> None:
             ("scale", "box.osim", "walk.trc", "--distance", "b=one:twoo"),
             "--distance: 'box' has no marker 'twoo'; did you mean 'two'?",
         ),
+        (("scale", "box.osim", "walk.trc", "--factor", "b=2"), "'walk.trc' has no effect; add"),
         (("scale", "box.osim", "--mass", "-1"), "--mass: expected a positive mass in kg, found -1"),
         (
             ("scale", "box.osim", "--factor", "b=0"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
@@ -93,11 +94,18 @@ OPERATORS_BY_NAME: dict[str, Callable[[str], Any]] = {
 
 
 def _parse_number(name: str, text: str) -> float:
-    """Return the number of a replacement."""
+    """Return the number of a replacement.
+
+    Raises:
+        SettingError: the text is not a positive number.
+    """
     try:
-        return float(text)
+        value = float(text)
     except ValueError:
-        raise SettingError(f"{name} expects a number, found '{text}'") from None
+        value = math.nan
+    if not 0.0 < value < math.inf:
+        raise SettingError(f"{name} expects a positive number, found '{text}'")
+    return value
 
 
 def find_change(name: str, value: str) -> Change:

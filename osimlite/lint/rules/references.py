@@ -35,7 +35,8 @@ def report_unresolved_reference(subject: Subject, report: FindingCollector) -> N
 
     OpenSim rejects the model when it connects the components. Its message does not name the line.
     For contact geometry, the message does not even name the force. If a group names a missing
-    member, OpenSim leaves the member out without a message.
+    member, OpenSim leaves the member out without a message. If a metabolic probe names a missing
+    muscle, OpenSim disables the probe.
 
     ```xml
       <HuntCrossleyForce::ContactParameters>
@@ -71,7 +72,8 @@ def report_reference_to_wrong_type(subject: Subject, report: FindingCollector) -
     Reports references to an existing component of another class, such as a joint in place of a
     parent frame, or a body in place of a contact geometry.
 
-    OpenSim says that the component does not exist, and rejects the model.
+    OpenSim says that the component does not exist, and rejects the model. It accepts such a name of
+    a muscle in a metabolic probe, but disables the probe.
 
     ```xml
     - <Marker name="asis"> <socket_parent_frame>/jointset/hip</socket_parent_frame> </Marker>
@@ -102,7 +104,8 @@ def report_missing_reference(subject: Subject, report: FindingCollector) -> None
 
     Reports sockets and names that are empty or not given.
 
-    OpenSim rejects the model when it connects the components.
+    OpenSim rejects the model when it connects the components. If the name of a muscle in a metabolic
+    probe is blank, it accepts the model, but disables the probe.
 
     ```xml
       <Marker name="asis">
@@ -143,7 +146,8 @@ def report_reference_form(subject: Subject, report: FindingCollector) -> None:
 
     OpenSim does not search for the component that is meant. It takes a bare name in a socket for a
     child of the component itself. It takes a path in `<coordinate>` of a limit force for the name
-    of a coordinate. It finds neither, and rejects the model.
+    of a coordinate. It finds neither, and rejects the model. It accepts such a name of a muscle in a
+    metabolic probe, but disables the probe.
 
     ```xml
     - <Marker name="asis"> <socket_parent_frame>pelvis</socket_parent_frame> </Marker>
@@ -205,7 +209,8 @@ def report_reference_case(subject: Subject, report: FindingCollector) -> None:
 
     Reports references that match a component only if letter case is ignored.
 
-    OpenSim compares names exactly, and rejects the model.
+    OpenSim compares names exactly, and rejects the model. It accepts such a name of a muscle in a
+    metabolic probe, but disables the probe.
 
     ```xml
     - <Marker name="asis"> <socket_parent_frame>/bodyset/Pelvis</socket_parent_frame> </Marker>

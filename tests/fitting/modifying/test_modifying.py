@@ -47,8 +47,8 @@ def test_words_are_done_in_their_order() -> None:
         ),
         (("joints", "mtp_r"), "write joints=weld:NAME"),
         (("joints", "weld:hipp_r"), "no joint 'hipp_r'"),
-        (("reserves", "many"), "reserves expects a number"),
-        (("reserves", "-1"), "set a positive one"),
+        (("reserves", "many"), "reserves expects a positive number"),
+        (("reserves", "-1"), "reserves expects a positive number, found '-1'"),
     ],
 )
 def test_what_is_none_is_refused(words: tuple[str, str], message: str) -> None:
@@ -144,3 +144,19 @@ def test_the_command_says_what_each_replacement_changed(fixtures: Path, tmp_path
         "tendon=rigid: nothing changed",
         "muscles=none: 4 DeGrooteFregly2016Muscle removed",
     ]
+
+
+@pytest.mark.parametrize(
+    ("word", "text"),
+    [
+        ("strength=-2", "strength expects a positive number, found '-2'"),
+        ("reserves=0", "reserves expects a positive number, found '0'"),
+        ("width=much", "width expects a positive number, found 'much'"),
+        ("joints=weld:kne", "the model has no joint 'kne'; did you mean 'knee'?"),
+    ],
+)
+def test_replacements_without_meaning(fixtures: Path, tmp_path: Path, word: str, text: str) -> None:
+    copy(fixtures / "labs" / "locked" / "leg.osim", tmp_path)
+    done = run("modify", "leg.osim", "--replace", word, folder=tmp_path)
+    assert done.code == 2 and text in done.err
+    assert [path.name for path in tmp_path.iterdir()] == ["leg.osim"]
