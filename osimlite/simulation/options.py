@@ -186,7 +186,7 @@ class Options(IntegrationOptions):
         0.01,
         "Time between the rows of the result files.",
         unit="SECONDS",
-        more="In s; the end of the motion is always recorded.",
+        more="The value is in s; the end of the motion is always recorded.",
     )
     initial: Mapping[str, float | str] | str | Path | None = define_option(
         None,
@@ -201,7 +201,7 @@ class Options(IntegrationOptions):
     equilibrate: bool = define_option(
         False,
         "Start muscles in equilibrium of fibers and tendon.",
-        more="As OpenSim's `equilibrateMuscles`; states that `initial` sets do not change.",
+        more="It works as OpenSim's `equilibrateMuscles`, but states that `initial` sets do not change.",
     )
     controls: Mapping[str, Any] | StoTable | str | Path | None = define_option(
         None,
@@ -219,7 +219,7 @@ class Options(IntegrationOptions):
         "Continue an earlier simulation, from the folder with its results.",
         unit="FOLDER",
         type=Path | None,
-        more="Or continue from its trajectory. The time continues, too. If the earlier simulation had a controller and "
+        more="The value may also be its trajectory. The time continues, too. If the earlier simulation had a controller and "
         "ended at a control step, the result is equal to that of an uninterrupted simulation to the last bit.",
     )
     progress: Progress | None = define_option(
@@ -250,7 +250,7 @@ class Options(IntegrationOptions):
     rolling: bool = define_option(
         False,
         "Turn on rolling constraints, which OpenSim leaves off.",
-        more="OpenSim leaves them off until a program turns them on.",
+        more="In OpenSim only a program can turn them on.",
     )
     external_loads: str | Path | None = define_option(
         None,

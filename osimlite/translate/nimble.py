@@ -69,7 +69,7 @@ class NimbleChange:
     Attributes:
         component: path of the component.
         difference: sentence about what Nimble does otherwise than OpenSim.
-        done: change of the model as a sentence; "" if nothing can be changed.
+        done: change of the model as a phrase; "" if nothing can be changed.
     """
 
     component: str

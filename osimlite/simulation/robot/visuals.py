@@ -288,7 +288,7 @@ def mesh_shape(
         note(
             "mesh-name",
             path,
-            "a file name that differs from the file's real name in capital letters",
+            "a file name that differs from the file's real name in capitals or slashes",
             "the file with the real name used",
             f"{name} as {copy.source.name}",
         )

@@ -110,7 +110,7 @@ def _choose_sides(piece: Tendon, compute_residuals: Residuals) -> Tendon:
 
 
 def _is_adjustable(part: TendonSite | WrapGeom) -> bool:
-    """Return whether a fit may move a part: a surface with a fixed side, or an unnamed site."""
+    """Return whether a fit may move a part: a surface without a sliding side site, or an unnamed site."""
     if isinstance(part, WrapGeom):
         return part.side is None or part.side.slides is None
     return not part.name
