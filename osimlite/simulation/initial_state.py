@@ -126,7 +126,7 @@ def resolve_initial_values(
                 )
             if infos[index].prescribed is not None:
                 raise SimulationError(
-                    f"coordinate '{name}' is prescribed, so that its {quantity} cannot be set; "
+                    f"coordinate '{name}' is prescribed, so its {quantity} cannot be set; "
                     "set its prescribed to false in the model"
                 )
             row[index] = _check_finite(value, quantity, name)

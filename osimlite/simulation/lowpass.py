@@ -53,7 +53,7 @@ def filter_lowpass(
     if cutoff * step >= 0.5:
         raise SettingError(
             f"a low-pass frequency of {cutoff:g} Hz is too high for samples every {step:g} s; "
-            f"take less than {0.5 / step:g} Hz"
+            f"use less than {0.5 / step:g} Hz"
         )
     return times, _run_filter(_run_filter(values, cutoff * step)[::-1], cutoff * step)[::-1]
 

@@ -127,7 +127,7 @@ def to_urdf(
         UnsupportedError: a joint or constraint is not supported.
     """
     if limits not in ("none", "range"):
-        raise OsimliteError(f"--limits is 'none' or 'range', not '{limits}'")
+        raise OsimliteError(f"--limits must be 'none' or 'range', not '{limits}'")
     for quantity, limit in (("effort", effort), ("velocity", velocity)):
         if limit is not None and not 0.0 < limit < math.inf:
             raise OsimliteError(

@@ -97,7 +97,7 @@ def test_a_filter_takes_the_noise_away(fixtures: Path, tmp_path: Path) -> None:
         ("0", "a low-pass frequency must be a positive number of Hz, not 0"),
         ("nan", "a low-pass frequency must be a positive number of Hz, not nan"),
         ("1e-300", None),
-        ("32", "32 Hz is too high for samples every 0.015625 s; take less than 32 Hz"),
+        ("32", "32 Hz is too high for samples every 0.015625 s; use less than 32 Hz"),
         ("1e308", "is too high for samples every 0.015625 s"),
     ):
         done = run(

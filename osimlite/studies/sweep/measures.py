@@ -245,7 +245,7 @@ def distance(engine: Any, feet: Sequence[str] | None = None) -> RunMeasure:
     )
     if offset is None:
         raise SettingError(
-            "the model has no translational coordinate, so that it covers no distance; choose another measure"
+            "the model has no translational coordinate, so it covers no distance; choose another measure"
         )
     return RunMeasure(
         "distance", lambda batch: batch.runs.states[:, offset] - batch.starts[:, offset]

@@ -398,8 +398,8 @@ class _Evaluations:
             for (row, _, _), requested_row in zip(evaluated, values.tolist(), strict=False)
         ):
             raise SettingError(
-                "the search takes another way than before, so that it cannot go on; another version of its library "
-                "may be installed, so start it anew in another folder"
+                "the search cannot continue, because it requests other points than before; another version of its "
+                "library may be installed. Start the search again in another folder"
             )
         # Points beyond the history are simulated.
         new_values = values[len(evaluated) :]

@@ -173,7 +173,7 @@ class Plan(IntegrationOptions):
         for name, column_type in other_columns:
             if name in result:
                 raise SettingError(
-                    f"the results would have two columns '{name}'; call a coordinate by its path, a function otherwise"
+                    f"the results would have two columns '{name}'; name a coordinate by its path, or rename a function"
                 )
             result[name] = column_type
         return result

@@ -131,7 +131,7 @@ def run_differential_evolution(compute_costs: CostFunction, search: Search) -> s
     )
     if not search.is_bounded:
         raise SettingError(
-            "differential evolution stays within the ranges; take --method cma to leave them"
+            "differential evolution stays within the ranges; use --method cma to leave them"
         )
     rng = np.random.default_rng(search.seed)
     size = len(search.start)
