@@ -59,6 +59,7 @@ def view(
     Example: osimlite view gait.osim walk.sto --geometry ~/OpenSim/Geometry --html walk.html
     """
     from osimlite.cli._console import say
+    from osimlite.errors import SettingError
     from osimlite.io.document.reader import read
     from osimlite.view.incomplete import build_showable, describe_errors
     from osimlite.view.model_view import ModelView
@@ -87,6 +88,15 @@ def view(
         for name, exporter in list_exporters("view").items()
         if option_values[name] is not None
     }
+    # A file of another format would be opened with the wrong program.
+    suffixes = {exporter.suffix: exporter for exporter in list_exporters("view").values()}
+    for name, exporter in requested_exporters.items():
+        suffix = Path(option_values[name]).suffix
+        if suffixes.get(suffix, exporter) is not exporter:
+            raise SettingError(
+                f"--{name} writes a file whose name ends with {exporter.suffix}, found "
+                f"'{option_values[name]}'"
+            )
     for name, exporter in requested_exporters.items():
         format_options = {option.name: option_values[option.name] for option in exporter.choices}
         say(f"wrote {exporter.write(model_view, option_values[name], **format_options)}")

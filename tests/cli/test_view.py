@@ -65,6 +65,7 @@ def test_coordinates_can_be_set(walker: Path) -> None:
         (("walker.osim", "nowhere.sto", "--html", "a.html"), "nowhere.sto"),
         (("walker.osim", "--geometry", "nowhere"), "--geometry names a folder"),
         (("walker.osim", "--set", "RKnee=1", "--html", "a.html"), "RKnee_rz"),
+        (("walker.osim", "--glb", "a.html"), "--glb writes a file whose name ends with .glb"),
         (
             ("walker.osim", "--at", "1", "--screenshot", "a.png"),
             "a time was given without a motion",

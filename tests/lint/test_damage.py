@@ -22,6 +22,7 @@ from osimlite.errors import OsimliteError
 from osimlite.io.document.printer import to_text
 from osimlite.io.document.reader import read_document
 from osimlite.io.document.source import Source
+from osimlite.lint import validate
 from osimlite.lint.engine import check_source, load_subject, run_rules
 from osimlite.lint.project_files import is_table
 from osimlite.lint.reporters import render
@@ -290,3 +291,10 @@ def test_a_table_of_unusual_size_takes_no_more_than_a_small_multiple_of_it(data)
                 tracemalloc.stop()
         assert report.findings
         assert peak < 150 * len(data) + 50_000_000
+
+
+def test_a_binary_file_is_called_one(fixtures: Path) -> None:
+    """The message names the commands that read a .c3d file; there is no finding about its encoding."""
+    (finding,) = validate(fixtures / "trials" / "force_plate.c3d").findings
+    assert finding.code == "OSIM001"
+    assert "this is a binary file; the commands 'ik', 'scale' and 'fit' read" in finding.message

@@ -108,11 +108,20 @@ def parse_source(source: Source, *, recover: bool = False) -> etree._Element:
     return root
 
 
+def is_binary(text: str) -> bool:
+    """Return whether the text of a file begins with bytes that no text has."""
+    return "\0" in text[:200]
+
+
 def _make_syntax_error(source: Source, line: int, column: int, message: str) -> NotWellFormedError:
     """Return the error for a message of the parser, at the right position and in plain words."""
     line, column, _ = locate_error(source, line, column, message)
     words = rephrase_message(message) if "<" in source.text else "there is no element in it"
-    if source.file is not None and source.file.lower().endswith(TABLE_SUFFIXES):
+    if is_binary(source.text):
+        words = "this is a binary file"
+        if source.file is not None and source.file.lower().endswith(".c3d"):
+            words += "; the commands 'ik', 'scale' and 'fit' read .c3d files"
+    elif source.file is not None and source.file.lower().endswith(TABLE_SUFFIXES):
         words += "; the commands 'validate' and 'info' accept tables, and 'diff' those of two .sto or .mot files"
     return NotWellFormedError(
         f"not well-formed XML: {words}", file=source.file, line=line, column=column

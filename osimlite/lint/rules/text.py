@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import codecs
 import re
 from typing import Final
 
 from osimlite.base.patterns import compile_later
 from osimlite.errors import NotWellFormedError, VersionError
+from osimlite.io.document.parsing import is_binary
 from osimlite.io.document.source import Source
 from osimlite.lint.fixes import rename_tag
 from osimlite.lint.registry import ERROR, INFO, REFUSES, RUNS, WARNING, FindingCollector, rule
@@ -121,11 +123,14 @@ def report_encoding(subject: Subject, report: FindingCollector) -> None:
             at=source.position(0),
             severity=ERROR,
         )
-    if source is None or source.encoding not in ("cp1252", "latin-1"):
+    # A binary file is no text in any encoding.
+    if source is None or is_binary(source.text):
         return
     # The declaration is read from the bytes, since the encoding is what is in doubt.
     declared = re.match(rb"\s*<\?xml[^>]*?encoding\s*=\s*[\"']([A-Za-z0-9._-]+)", source.data)
     name = declared[1].decode() if declared else "UTF-8"
+    if source.encoding not in ("cp1252", "latin-1") and _is_known_encoding(name):
+        return
     try:
         source.data.decode(name)
     except UnicodeDecodeError as error:
@@ -141,6 +146,15 @@ def report_encoding(subject: Subject, report: FindingCollector) -> None:
             f"the encoding '{name}' is not known; the text is read as {source.encoding}",
             at=source.position(0),
         )
+
+
+def _is_known_encoding(name: str) -> bool:
+    """Return whether Python can decode an encoding."""
+    try:
+        codecs.lookup(name)
+    except LookupError:
+        return False
+    return True
 
 
 @rule("OSIM003", "not-a-model", severity=ERROR, fixes="unsafe")
