@@ -30,7 +30,7 @@ def make_divergence_error(t: float, h: float) -> IntegrationError:
     """
     return IntegrationError(
         f"the motion diverges at t = {t:.9g} s; use a shorter fixed step than {h:g} s, "
-        "or control the error (--accuracy)",
+        "or control the error (--accuracy, accuracy=)",
         t,
     )
 
@@ -108,7 +108,7 @@ class SemiImplicitEuler(Stepper):
             if result is None:
                 raise IntegrationError(
                     f"the constraints cannot be enforced at t = {t:.9g} s; use a shorter fixed step than {h:g} s, "
-                    "or control the error (--accuracy)",
+                    "or control the error (--accuracy, accuracy=)",
                     t,
                 )
             y = result
@@ -120,7 +120,7 @@ class SemiImplicitEuler(Stepper):
         except IntegrationError as error:
             raise IntegrationError(
                 f"{error} If all of these are correct, use a shorter fixed step than {self._h:g} s, or control the error "
-                "(--accuracy).",
+                "(--accuracy, accuracy=).",
                 t,
                 error.index,
             ) from error

@@ -89,6 +89,6 @@ def replace_by_ideal_actuators(model: Model, physiology: bool) -> list[ScalarAct
     if not result:
         raise ModelError(
             f"'{model.name}' has no actuators; add reserve actuators: a ForceSet in force_set_files "
-            "of the setup, or with --forces"
+            "of the setup, or with --forces (forces=)"
         )
     return result

@@ -129,7 +129,9 @@ def run(
         )
     # An option without effect would suggest results that it does not give.
     if refine is not None and not class_name.startswith("Moco"):
-        raise SettingError(f"{add_article(class_name)} has no mesh to refine; leave out --refine")
+        raise SettingError(
+            f"{add_article(class_name)} has no mesh to refine; leave out the refinement"
+        )
     outcome = Outcome(progress=progress)
     replaced = substitute_inputs(setup_object, file.parent, substitutes or {})
     # Errors are cheaper to find before a tool that may run for hours.

@@ -387,7 +387,7 @@ class SubjectFolder:
                     "pass",
                     f"{trial_path}/passes/{pass_index}-{processing_pass.name}",
                     "several processing passes of a trial",
-                    f"{LEFT_OUT}; select one with --processing-pass",
+                    f"{LEFT_OUT}; select one with --processing-pass (processing_pass=)",
                     processing_pass.name,
                 )
 

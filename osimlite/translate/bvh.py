@@ -72,7 +72,7 @@ def to_bvh(
         ModelError: the model is not a mechanism.
     """
     if not 0.0 < scale < np.inf:
-        raise SettingError(f"--scale takes a positive number, not {scale:g}")
+        raise SettingError(f"the scale must be a positive number, not {scale:g}")
     mechanism = build_mechanism(model)
     # Without a motion the file has one frame, the default pose.
     times = np.zeros(1)
@@ -126,7 +126,7 @@ class BvhMarkers:
         self, path: str | Path, name: str | None = None, scale: float = CENTIMETRES
     ) -> None:
         if not 0.0 < scale < np.inf:
-            raise SettingError(f"--scale takes a positive number, not {scale:g}")
+            raise SettingError(f"the scale must be a positive number, not {scale:g}")
         self.motion = read_bvh(path)
         self.name = name or Path(path).stem
         self._scale = scale

@@ -127,11 +127,11 @@ def to_urdf(
         UnsupportedError: a joint or constraint is not supported.
     """
     if limits not in ("none", "range"):
-        raise OsimliteError(f"--limits must be 'none' or 'range', not '{limits}'")
+        raise OsimliteError(f"limits must be 'none' or 'range', not '{limits}'")
     for quantity, limit in (("effort", effort), ("velocity", velocity)):
         if limit is not None and not 0.0 < limit < math.inf:
             raise OsimliteError(
-                f"a limit of {quantity} must be a positive number, not {limit:g}; leave out the option for no limit"
+                f"a limit of {quantity} must be a positive number, not {limit:g}; leave it out for no limit"
             )
     # Options are checked before the model is built, which may take seconds.
     mechanism = build_mechanism(model)

@@ -151,7 +151,7 @@ FORMATS = " or ".join(repr(name) for name in (*list_exporters("translate"), "osi
         (("walker.osim", "--to", "mjcf", "--merge"), "--merge is an option of --to urdf"),
         (("walker.osim", "--mujoco", "3"), "--mujoco is an option of --to mjcf"),
         (("walker.osim", "--to", "mjcf", "--mujoco", "2"), "must be 3 or 4, not 2"),
-        (("walker.osim", "--limits", "all"), "--limits must be 'none' or 'range'"),
+        (("walker.osim", "--limits", "all"), "limits must be 'none' or 'range'"),
         (("walker.osim", "--effort", "0"), "a limit of effort must be a positive number, not 0"),
         (("gone.osim",), "gone.osim"),
         (

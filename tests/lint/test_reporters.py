@@ -163,7 +163,7 @@ def test_every_format_of_nothing(name):
 
 
 def test_an_unknown_format_is_refused():
-    with pytest.raises(OsimliteError, match=r"--format must be one of full, concise"):
+    with pytest.raises(OsimliteError, match=r"the format must be one of full, concise"):
         render(Report(), "yaml")
 
 

@@ -115,6 +115,11 @@ def test_limits_locks_and_merging_on_demand():
     assert unaccounted(model, merged) == [] == unaccounted(model, free)
 
 
+def test_messages_of_the_library_name_the_parameter_not_the_option():
+    with pytest.raises(OsimliteError, match=r"^limits must be 'none' or 'range', not 'hard'$"):
+        osimlite.to_urdf(dynamic_walker(), limits="hard")
+
+
 def test_impossible_inertia_and_names_and_frames_are_told():
     model = dynamic_walker()
     model.find("/bodyset/RightShank").inertia = (2.0, 2.0, 10.0, 0.0, 0.0, 0.0)

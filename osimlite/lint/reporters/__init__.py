@@ -49,7 +49,7 @@ def render(
     if name not in RENDERERS:
         from osimlite.base.text import join_words
 
-        raise OsimliteError(f"--format must be one of {join_words(FORMATS)}, not '{name}'")
+        raise OsimliteError(f"the format must be one of {join_words(FORMATS)}, not '{name}'")
     module, function = RENDERERS[name]
     renderer = getattr(import_module(f"osimlite.lint.reporters.{module}"), function)
     if name == "full":

@@ -44,7 +44,7 @@ def make_engine(mechanism: Mechanism, forces: Forces, settings: EngineSettings) 
     """
     if settings.show:
         raise SimulationError(
-            "the compiled engine shows no window; play the motion with osimlite view, or use --engine bullet for --gui"
+            "the compiled engine shows no window; play the motion with osimlite view, or use the engine 'bullet'"
         )
     if settings.route not in ("auto", CompiledEngine.route):
         raise OsimliteError(

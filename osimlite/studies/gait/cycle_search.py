@@ -191,7 +191,8 @@ class CycleSearch:
         # Without varied initial values all random walkers of a model would be the same.
         if not self._starts:
             raise SettingError(
-                "the search draws random initial states; vary the initial values or speeds of some coordinates with --vary"
+                "the search draws random initial states; vary the initial values or speeds of some coordinates, "
+                "with --vary (vary=)"
             )
         self._least = [variable.low for variable in plan.variables]
         engine: Any = self.variants.base_variant.engine
@@ -199,7 +200,7 @@ class CycleSearch:
         if len(self.footing.feet) != 2:
             raise SettingError(
                 f"the search for cycles needs two feet, but '{engine.mechanism.name}' has "
-                f"{len(self.footing.feet)}; name two with --foot"
+                f"{len(self.footing.feet)}; name two with --foot (feet=)"
             )
         self._first: StepMap | None = None
 

@@ -100,7 +100,7 @@ def find_footing(engine: BatchEngine, feet: Sequence[str] | None = None) -> Foot
                 )
         if len(named_feet) < 2:
             raise OsimliteError(
-                f"a walk needs two feet, found '{feet[0]}' only; name the contact forces of both feet, each with a --foot"
+                f"a walk needs two feet, found '{feet[0]}' only; name the contact forces of both feet, each with a --foot (feet=)"
             )
     else:
         named_feet = _find_feet(engine.mechanism, soles)
@@ -129,7 +129,7 @@ def _find_feet(mechanism: Mechanism, soles: Sequence[_SoleContact]) -> tuple[tup
         names = join_words(mechanism.bodies[end].name for end in end_bodies)
         raise OsimliteError(
             f"'{mechanism.name}' touches the ground with the ends of {format_count(len(end_bodies), 'leg')} "
-            f"({names}), but a walk needs two feet; name their contact forces with --foot"
+            f"({names}), but a walk needs two feet; name their contact forces with --foot (feet=)"
         )
     result = []
     for end in end_bodies:

@@ -148,7 +148,7 @@ def find_gait(
         )
         if not candidates:
             raise SimulationError(
-                f"none of {samples} random walkers made two steps; widen the ranges, or try more walkers (--samples)"
+                f"none of {samples} random walkers made two steps; widen the ranges, or try more walkers (--samples, samples=)"
             )
         cycles = close_candidates(
             search,
@@ -242,7 +242,7 @@ def close_candidates(
     if not cycles:
         raise SimulationError(
             f"no gait cycle was found from {format_count(len(candidates), 'random walker')} that made two steps; try more "
-            "walkers (--samples), refine more of the best ones (--tries), or vary other quantities"
+            "walkers (--samples, samples=), refine more of the best ones (--tries, tries=), or vary other quantities"
         )
     return cycles
 
@@ -267,7 +267,7 @@ def round_cycle(search: CycleSearch, model_cycle: ModelCycle, digits: int) -> Mo
     except OsimliteError as error:
         raise SimulationError(
             f"with parameters that are rounded to {digits} digits, there is no gait cycle; keep more digits "
-            f"(--digits). {error.message}"
+            f"(--digits, digits=). {error.message}"
         ) from None
 
 

@@ -107,7 +107,7 @@ def planted(engine: Any, feet: Sequence[str] | None) -> registry.StartFunction:
         SettingError: the engine is not the compiled one.
     """
     if engine.name != "compiled":
-        raise SettingError("--planted needs --engine compiled")
+        raise SettingError("a planted start needs the compiled engine")
     footing = find_footing(engine, feet)
 
     def plant(
@@ -154,7 +154,7 @@ def _make_walk_measure(
 def _find_footing(name: str, engine: Any, feet: Sequence[str] | None) -> FootContacts:
     """Return the feet for a measure, which needs the compiled engine."""
     if engine.name != "compiled":
-        raise SettingError(f"the measure '{name}' needs --engine compiled")
+        raise SettingError(f"the measure '{name}' needs the compiled engine")
     return find_footing(engine, feet)
 
 

@@ -332,7 +332,7 @@ class VariedControls:
         if len(self._puts) == count_before:
             raise SettingError(
                 f"no PrescribedController sets the control of '{actuator}' by a function, so there is no control to "
-                "scale; give one with --controls"
+                "scale; give one with --controls (controls=)"
             )
 
 

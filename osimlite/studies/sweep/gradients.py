@@ -53,7 +53,7 @@ class _UnknownEvents(list[Any]):
     def _refuse(self, *_: object) -> NoReturn:
         """Raise an error for a measure that asks for events."""
         raise UnsupportedError(
-            "events of a run have no derivatives; choose another measure, or another --method"
+            "events of a run have no derivatives; choose another measure, or another method"
         )
 
     __iter__ = __len__ = __getitem__ = __contains__ = _refuse
@@ -74,16 +74,17 @@ class Gradients:
     def __init__(self, plan: Plan) -> None:
         if plan.engine != "compiled" or plan.integrator != MERSON:
             raise SettingError(
-                "--method gradient needs the compiled engine and the integrator 'merson', the defaults; "
-                "remove --engine and --integrator"
+                "the method 'gradient' needs the compiled engine and the integrator 'merson', the defaults; "
+                "leave out the other engine or integrator"
             )
         if plan.controller is not None:
             raise SettingError(
-                "--method gradient does not support controllers, whose controls have no derivatives; choose another --method"
+                "the method 'gradient' does not support controllers, whose controls have no derivatives; choose another method"
             )
         if plan.stops:
             raise SettingError(
-                "--method gradient needs runs that last until --to; remove --below and --above"
+                "the method 'gradient' needs runs that last until their end time; "
+                "remove the levels that end runs (--stop-below, --stop-above)"
             )
         self._plan, self._variants = plan, Variants(plan)
         base_variant = self._variants.base_variant
@@ -91,7 +92,7 @@ class Gradients:
         if self._measure.watches:
             raise UnsupportedError(
                 f"'{self._measure.name}' depends on events, which have no derivatives; "
-                "choose another measure, or another --method"
+                "choose another measure, or another method"
             )
         self._times = (
             [0.0, plan.to]
@@ -189,7 +190,7 @@ class Gradients:
             ].name
             raise SimulationError(
                 f"'{self._measure.name}' has no derivative with respect to '{variable_name}'; it may depend "
-                "on more than the states. Choose another measure, or another --method"
+                "on more than the states. Choose another measure, or another method"
             )
         return result
 

@@ -252,7 +252,8 @@ def plan(
         gains = controller.gains(model, Simulation(model, **simulation_options).engine)
         if not (vary or gains):
             raise SettingError(
-                "there is nothing to vary, because the controller has no parameters (written as ~2<0,20>); add --vary"
+                "there is nothing to vary, because the controller has no parameters (written as ~2<0,20>); "
+                "name what to vary with --vary (vary=)"
             )
     result = resolve_variables(vary, model, mechanism, parameters, gains)
     # Nothing varies by name: all other parameters of the controller do.
@@ -312,7 +313,7 @@ def _read_bounds(gain: Gain) -> tuple[float, float]:
     if not (isfinite(gain.low) and isfinite(gain.high)):
         raise SettingError(
             f"the parameter '{gain.name}' has no bounds, such as <0,2> in 1~0.1<0,2>; give its range, for "
-            f"example --vary {gain.name}=0:2"
+            f"example {gain.name}=0:2"
         )
     return gain.low, gain.high
 

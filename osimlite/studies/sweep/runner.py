@@ -130,7 +130,7 @@ class _Observers:
         )
         # Only the compiled engine stops runs at events.
         if self.watches and plan.engine != "compiled":
-            raise SettingError("--stop-below and --stop-above need --engine compiled")
+            raise SettingError("levels that end runs need the compiled engine")
         # The engine detects no events unless it may record at least one.
         event_counts = [measure.event_count(plan.to) for measure in self.measures]
         self.most_events = max([*event_counts, 1 if self.watches else 0])

@@ -124,8 +124,8 @@ def choose_samples(
     # Both would fix the number of runs, in different ways.
     if sampler is None and count is not None and with_values:
         raise SettingError(
-            "--samples sets the number of runs of a random sampler, and the COUNT in the range of "
-            f"{join_words(with_values)} the size of a grid; leave out one of the two, or select a --sampler"
+            "the number of samples sets the number of runs of a random sampler, and the COUNT in the range of "
+            f"{join_words(with_values)} the size of a grid; leave out one of the two, or select a sampler"
         )
     if sampler is None:
         sampler = (
@@ -151,12 +151,14 @@ def choose_samples(
             )
         return Samples(tuple(variables), sampler, grid_size, seed)
     if count is None:
-        raise SettingError("the number of samples is missing; add it, as in --samples 1000")
+        raise SettingError(
+            "the number of samples is missing; add it, as in --samples 1000 (count=1000)"
+        )
     if count < 1:
         raise SettingError(f"the number of samples must be at least 1, not {count}")
     if sampler == "sobol" and count > MAX_SOBOL_POINTS:
         raise SettingError(
-            f"Sobol's sequence has only {MAX_SOBOL_POINTS} points; use --sampler random for more samples"
+            f"Sobol's sequence has only {MAX_SOBOL_POINTS} points; use the sampler 'random' for more samples"
         )
     return Samples(tuple(variables), sampler, count, seed)
 

@@ -131,7 +131,7 @@ def run_differential_evolution(compute_costs: CostFunction, search: Search) -> s
     )
     if not search.is_bounded:
         raise SettingError(
-            "differential evolution stays within the ranges; use --method cma to leave them"
+            "differential evolution stays within the ranges; use the method 'cma' to leave them"
         )
     rng = np.random.default_rng(search.seed)
     size = len(search.start)
@@ -243,5 +243,5 @@ def _require_two_variables(search: Search) -> None:
     """Refuse a single variable, whose covariance matrix CMA-ES cannot adapt."""
     if len(search.start) < 2:
         raise SettingError(
-            "--method cma needs at least two variables; use --method nelder-mead for one variable"
+            "the method 'cma' needs at least two variables; use the method 'nelder-mead' for one variable"
         )

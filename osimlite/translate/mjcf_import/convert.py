@@ -164,17 +164,17 @@ def from_mjcf(
         UnsupportedError: the file has no body.
     """
     for option, value, choices in (
-        ("written-for", written_for, (None, 2, 3, 4)),
-        ("muscle-class", muscle_class, ("millard", "exact")),
+        ("written_for", written_for, (None, 2, 3, 4)),
+        ("muscle_class", muscle_class, ("millard", "exact")),
         ("armature", armature, ("rotors", "none")),
-        ("joint-limits", joint_limits, ("forces", "range")),
+        ("joint_limits", joint_limits, ("forces", "range")),
         ("contacts", contacts, ("forces", "geometry", "none")),
         ("up", up, ("y", "z")),
-        ("tendon-paths", tendon_paths, ("wraps", "geodesics")),
+        ("tendon_paths", tendon_paths, ("wraps", "geodesics")),
     ):
         if value not in choices:
             allowed = " or ".join(f"'{choice}'" for choice in choices if choice is not None)
-            raise SettingError(f"--{option} is {allowed}, not '{value}'")
+            raise SettingError(f"{option} must be {allowed}, not '{value}'")
     options = ImportOptions(
         # Versions before 3 follow the rules of version 3.
         written_for=None if written_for is None else max(written_for, 3),

@@ -86,7 +86,7 @@ def find_version(draft: ConversionDraft, tendons: list[Tendon], poses: SampledPo
     raise SettingError(
         f"MuJoCo 3 and 4 use the side sites of this file differently: the length of {count} differs, "
         f"of '{worst_name}' by up to {differences[worst_row]:.3g} m; name the version that the file was "
-        "written for: --written-for 3 (also for older versions) or --written-for 4"
+        "written for, 3 (also for older versions) or 4: --written-for 3 (written_for=3)"
     )
 
 

@@ -284,7 +284,7 @@ def test_what_cannot_be_is_said(made, walker, tmp_path):
     ]:
         with pytest.raises(SettingError, match=words):
             optimize(made, DISTANCE, tmp_path, **choices)
-    with pytest.raises(SettingError, match="use --method nelder-mead"):
+    with pytest.raises(SettingError, match="use the method 'nelder-mead'"):
         optimize(plan(walker, {"RHip_rz": (0.3, 0.5)}), DISTANCE, tmp_path)
     with pytest.raises(
         SettingError, match=r"'RHip_rz' has 3 grid points, .*; leave out the number of points"
@@ -309,6 +309,6 @@ def test_files_of_others_are_spared_unless_forced(made, tmp_path, name):
 def test_a_search_that_cannot_begin_leaves_no_folder(made, walker, tmp_path):
     with pytest.raises(SettingError, match="did you mean 'distance'"):
         optimize(made, Objective("distanc"), tmp_path / "new")
-    with pytest.raises(SettingError, match="use --method nelder-mead"):
+    with pytest.raises(SettingError, match="use the method 'nelder-mead'"):
         optimize(plan(walker, {"RHip_rz": (0.3, 0.5)}), DISTANCE, tmp_path / "new")
     assert not list(tmp_path.iterdir())

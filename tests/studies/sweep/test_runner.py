@@ -422,5 +422,5 @@ assert Runner(made).run(np.array([[0.4]])).status == ["done"]
 def test_what_only_the_compiled_engine_watches(walker):
     pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
     for choices in ({"measures": ("steps",)}, {"stops": (Stop("Pelvis_ty", 0.5),)}):
-        with pytest.raises(SettingError, match="--engine compiled"):
+        with pytest.raises(SettingError, match="the compiled engine"):
             Runner(plan(walker, {"RHip_rz": (0.0, 1.0)}, engine="bullet", **choices))

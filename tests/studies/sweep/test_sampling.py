@@ -120,7 +120,7 @@ def test_what_does_not_go_together_is_said():
         choose_samples([free])
     with pytest.raises(SettingError, match="12 points"):
         choose_samples(THREE, "grid", 5)
-    with pytest.raises(SettingError, match="leave out one of the two, or select a --sampler"):
+    with pytest.raises(SettingError, match="leave out one of the two, or select a sampler"):
         choose_samples(THREE, None, 5)
     assert choose_samples(THREE, "lhs", 5).count == 5
     with pytest.raises(SettingError, match="at least 1"):

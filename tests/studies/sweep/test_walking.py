@@ -144,7 +144,7 @@ def test_feet_may_be_given(walker):
 
 def test_who_cannot_be_planted_is_told_before_any_run(walker):
     pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
-    with pytest.raises(SettingError, match="--planted needs --engine compiled"):
+    with pytest.raises(SettingError, match="a planted start needs the compiled engine"):
         Runner(plan(walker, VARY, engine="bullet", is_planted=True))
     walker.tree().by_path["/forceset/LFootForce"].appliesForce = False
     walker.tree().by_path["/forceset/LKneeForce"].appliesForce = False
@@ -157,5 +157,5 @@ def test_walking_needs_the_compiled_engine():
     pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
     with Simulation(dynamic_walker(), "bullet") as simulation:
         for name in ("steps", "scuffs", "progress", "time_to_fall"):
-            with pytest.raises(SettingError, match=f"'{name}' needs --engine compiled"):
+            with pytest.raises(SettingError, match=f"'{name}' needs the compiled engine"):
                 make_measure(name, simulation.engine)

@@ -110,7 +110,7 @@ def test_constraints(tmp_path):
 
 
 def test_wrong_words_and_files_are_refused(mechanism, tmp_path):
-    with pytest.raises(OsimliteError, match="--armature is 'rotors' or 'none', not 'x'"):
+    with pytest.raises(OsimliteError, match=r"^armature must be 'rotors' or 'none', not 'x'"):
         osimlite.from_mjcf(mechanism, armature="x")
     with pytest.raises(OsimliteError, match="the file does not exist"):
         osimlite.from_mjcf(tmp_path / "absent.xml")

@@ -169,7 +169,7 @@ class BulletEngine(KernelEngine):
         except SystemError:
             raise SimulationError(
                 f"Bullet refuses the inertias of '{self.mechanism.name}', which are invalid after its rounding; check "
-                "masses and mass centers, or use --engine compiled"
+                "masses and mass centers, or use the compiled engine"
             ) from None
         self._pack_forces(data, 8 * first, *forces)
         # numpy reads tuples at half the speed.

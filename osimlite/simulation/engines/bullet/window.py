@@ -63,14 +63,14 @@ class Window:
     ) -> None:
         if sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
             raise SimulationError(
-                "there is no screen to show the motion on (DISPLAY is not set); leave out --gui, "
+                "there is no screen to show the motion on (DISPLAY is not set); leave out --gui (show=True), "
                 "and use --animate to write the motion as a GIF"
             )
         with mute_output(1):
             self.client = int(bullet.connect(bullet.GUI))
         if self.client < 0:
             raise SimulationError(
-                "Bullet cannot open a window here; leave out --gui, and use --animate to write the motion as a GIF"
+                "Bullet cannot open a window here; leave out --gui (show=True), and use --animate to write the motion as a GIF"
             )
         # Y is up in OpenSim's models without gravity, too.
         y_is_up = abs(gravity[2]) <= max(abs(gravity[0]), abs(gravity[1]))

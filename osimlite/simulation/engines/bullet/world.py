@@ -56,7 +56,7 @@ with mute_output():
         "pybullet",
         extra="bullet",
         purpose="the PyBullet engine",
-        alternative="--engine compiled, whose motions osimlite view shows",
+        alternative="the compiled engine, whose motions osimlite view shows",
     )
     import pybullet as bullet
 
