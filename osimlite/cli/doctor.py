@@ -16,6 +16,7 @@ from typing import Annotated
 from osimlite.base.cores import count_cores
 from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.require import SAFE_PATH
+from osimlite.base.text import format_count
 from osimlite.cli._command import Argument, command
 from osimlite.cli._console import add_row, create_table, print_table, say
 from osimlite.cli._kernels import explain_kernels
@@ -349,4 +350,4 @@ def _count_meshes(folder: Path) -> str:
     if not folder.is_dir():
         return "does not exist"
     count = sum(path.suffix.lower() in MESHES for path in folder.iterdir())
-    return f"{count} mesh files" if count else "no mesh files"
+    return f"{format_count(count, 'mesh file')}" if count else "no mesh files"

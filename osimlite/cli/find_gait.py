@@ -139,7 +139,7 @@ def _describe_result(gait: Gait) -> FactTable:
     )
     facts.add(
         "search",
-        f"{gait.candidates} random walkers made two steps; {format_count(gait.cycles, 'cycle')} found",
+        f"{format_count(gait.candidates, 'random walker')} made two steps; {format_count(gait.cycles, 'cycle')} found",
     )
     facts.add_files(gait.files)
     return facts

@@ -328,13 +328,14 @@ def _describe_cycle(result: GaitReport, files: Sequence[Path]) -> FactTable:
         facts.add(
             f"within {neighbourhood.part:.0%}",
             f"{neighbourhood.walked} of {neighbourhood.starts} initial states near the cycle lead to "
-            f"{neighbourhood.steps} steps",
+            f"{format_count(neighbourhood.steps, 'step')}",
         )
     if result.basin is not None:
         basin = result.basin
         facts.add(
             "basin",
-            f"{basin.part:.0%} of {basin.steps.size} initial states lead to {basin.target_steps} steps",
+            f"{basin.part:.0%} of {format_count(basin.steps.size, 'initial state')} lead to "
+            f"{format_count(basin.target_steps, 'step')}",
         )
     for skipped in summarize_skipped(result.skipped):
         facts.add("left out", skipped)

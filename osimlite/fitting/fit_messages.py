@@ -65,7 +65,8 @@ def describe_fit(
         )
         yield (
             "sensors",
-            f"{result['frames']} frames, {result['sensors']} sensors: errors of {rms:.2f} degrees "
+            f"{format_count(result['frames'], 'frame')}, {format_count(result['sensors'], 'sensor')}: "
+            f"errors of {rms:.2f} degrees "
             f"(root mean square), at most {largest:.2f} degrees ({result['worst_sensor']} at "
             f"{result['worst_sensor_time']:g} s)",
         )

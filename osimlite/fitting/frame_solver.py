@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from osimlite.base.text import suggest_name
+from osimlite.base.text import format_count, suggest_name
 from osimlite.errors import SettingError
 from osimlite.fitting.inverse_kinematics import (
     compute_first_pose,
@@ -113,7 +113,7 @@ class FrameSolver:
             self.markers or marker_positions.size
         ):
             raise SettingError(
-                f"expected {len(self.markers)} rows of 3 numbers, one for each marker; found "
+                f"expected {format_count(len(self.markers), 'row')} of 3 numbers, one for each marker; found "
                 f"{' × '.join(map(str, marker_positions.shape)) or 'one number'}"
             )
         if self.sensors or rotations.size:

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from osimlite.base.files import read_file
 from osimlite.base.records import dataclass
+from osimlite.base.text import format_count
 from osimlite.errors import DocumentError
 from osimlite.fitting.measurements import Measurements
 from osimlite.io.tables.c3d import ENDING, read_c3d_markers
@@ -108,7 +109,7 @@ def read_trc(path: str | Path) -> MarkerData:
             cells = line.split()
         if any(cell.strip() for cell in cells[width:]):
             raise DocumentError(
-                f"the row has more than the {width} cells of {len(names)} markers",
+                f"the row has more than the {format_count(width, 'cell')} of {format_count(len(names), 'marker')}",
                 file=file,
                 line=number,
             )

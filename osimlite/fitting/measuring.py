@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from osimlite.base.named_tuples import NamedTuple
-from osimlite.base.text import join_words, suggest_name
+from osimlite.base.text import format_count, join_words, suggest_name
 from osimlite.errors import SettingError
 from osimlite.fitting.inverse_kinematics import find_marker_stations
 from osimlite.fitting.marker_data import MarkerData
@@ -106,7 +106,7 @@ class ScaleFactorFinder:
         for pair in measurement.marker_pair_set.objects:
             names = [getattr(marker, "name", None) or str(marker) for marker in pair.markers]
             if len(names) != 2:
-                return 0.0, f"a pair names {len(names)} markers"
+                return 0.0, f"a pair names {format_count(len(names), 'marker')}"
             for marker in names:
                 if marker not in self._stations:
                     return (

@@ -15,6 +15,7 @@ import numpy as np
 
 from osimlite.base.files import read_file
 from osimlite.base.records import dataclass, field, replace
+from osimlite.base.text import format_count
 from osimlite.errors import DocumentError
 from osimlite.io.tables.storage import format_number
 from osimlite.mechanics.multibody.spatial import Array
@@ -280,7 +281,8 @@ def read_bvh(path: str | Path) -> BvhMotion:
     # Compared before the numbers are read, so that a wrong count does not fill the memory.
     if word_count != count * width:
         raise reader.fail(
-            f"{count} frames of {width} channels are {count * width} numbers, but {word_count} words follow"
+            f"{format_count(count, 'frame')} of {format_count(width, 'channel')} are "
+            f"{count * width} numbers, but {word_count} words follow"
         )
     values = np.array([reader.take_number() for _ in range(word_count)]).reshape(count, width)
     return BvhMotion(tuple(joints), frame_time, values, str(path))

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from osimlite.base.text import format_count
 from osimlite.derivatives.symbols import casadi, postpone_interrupts, raise_interrupt
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.optimal.bounds import read_range
@@ -169,7 +170,10 @@ class Program:
             # per value.
             count = rows[-1].numel()
             if bounds and len(bounds) != count:
-                raise problem.invalid_error(goal, f"it has {count} values and {len(bounds)} bounds")
+                raise problem.invalid_error(
+                    goal,
+                    f"it has {format_count(count, 'value')} and {format_count(len(bounds), 'bound')}",
+                )
             limits += bounds or [(0.0, 0.0)] * count
             self.end_labels += [
                 goal.name if count == 1 else f"{goal.name} {k}" for k in range(count)

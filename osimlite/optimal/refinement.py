@@ -16,7 +16,7 @@ import numpy as np
 
 from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.records import dataclass
-from osimlite.base.text import suggest_or_list
+from osimlite.base.text import format_count, suggest_or_list
 from osimlite.errors import SettingError
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.optimal.ipopt import Progress, SolverResult
@@ -100,8 +100,8 @@ class Round(NamedTuple):
     duration: float
 
     def __str__(self) -> str:
-        steps = f"{self.iterations} iterations in {self.duration:.3g} s"
-        return f"{self.intervals} intervals, error {self.error:.2g}, objective {self.objective:.8g}; {steps}"
+        steps = f"{format_count(self.iterations, 'iteration')} in {self.duration:.3g} s"
+        return f"{format_count(self.intervals, 'interval')}, error {self.error:.2g}, objective {self.objective:.8g}; {steps}"
 
 
 def solve_with_refinement(

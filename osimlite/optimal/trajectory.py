@@ -10,6 +10,7 @@ import numpy as np
 
 from osimlite.base.files import make_folder, open_atomically
 from osimlite.base.records import dataclass, field
+from osimlite.base.text import format_count
 from osimlite.errors import DocumentError
 from osimlite.io.tables.storage import StoTable, format_adapter_table, read_sto
 from osimlite.mechanics.multibody.spatial import Array
@@ -118,7 +119,10 @@ class MocoTrajectory:
         if not any(counts):
             counts[0] = len(table.columns)
         if sum(counts) != len(table.columns):
-            message = f"the header counts {sum(counts)} columns besides the time, but the file has {len(table.columns)}"
+            message = (
+                f"the header counts {format_count(sum(counts), 'column')} besides the time, "
+                f"but the file has {len(table.columns)}"
+            )
             raise DocumentError(message, file=str(path))
         names = dict[str, tuple[str, ...]]()
         first_column = 0

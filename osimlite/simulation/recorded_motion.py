@@ -256,7 +256,7 @@ class RecordedMotion(Movement):
             )
         if not result:
             raise DocumentError(
-                f"no column is a coordinate of '{mechanism.name}'; its coordinates are "
+                f"no column is a coordinate of '{mechanism.name}', which has "
                 f"{join_words(mechanism.coordinate_names)}",
                 file=table.file,
             )

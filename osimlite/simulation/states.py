@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from osimlite.base.records import dataclass
+from osimlite.base.text import format_count
 from osimlite.errors import OsimliteError
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
@@ -122,8 +123,8 @@ class StateLayout:
     def make_length_error(self, count: int) -> OsimliteError:
         """Return the error for a state with `count` entries."""
         n, auxiliary_count = len(self.order), len(self.variables)
-        contents = f"{n} values, {n} speeds" + (
-            f", {auxiliary_count} auxiliary states" if auxiliary_count else ""
+        contents = f"{format_count(n, 'value')}, {format_count(n, 'speed')}" + (
+            f", {format_count(auxiliary_count, 'auxiliary state')}" if auxiliary_count else ""
         )
         return OsimliteError(
             f"a state of '{self.mechanism.name}' has {self.size} numbers ({contents}), not {count}"

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from osimlite.base.progress import watch_items
-from osimlite.base.text import join_words
+from osimlite.base.text import format_count, join_words
 from osimlite.io.tables.storage import read_sto
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
@@ -148,7 +148,7 @@ def equilibrate_rows(
             states[missing, index : index + len(element.states)] = np.nan
         outcome.add_message(
             "no equilibrium",
-            f"{reasons[path]}. This concerns {np.count_nonzero(missing)} of {len(times)} times, "
+            f"{reasons[path]}. This concerns {np.count_nonzero(missing)} of {format_count(len(times), 'time')}, "
             f"{_describe_spans(times, missing)}. {consequence}",
         )
     outcome.summary["without_equilibrium"] = {

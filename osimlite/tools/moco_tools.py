@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from osimlite.base.text import format_count
 from osimlite.errors import OsimliteError
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.tools.evidence import Evidence
@@ -74,7 +75,7 @@ def report_solution(job: Job, problem: Problem, solution: MocoSolution, outcome:
     }
     outcome.add_message(
         "status",
-        f"{solution.status} after {solution.iterations} iterations in {solution.duration:.3g} s",
+        f"{solution.status} after {format_count(solution.iterations, 'iteration')} in {solution.duration:.3g} s",
     )
     for refinement in solution.rounds:
         outcome.add_message("mesh", str(refinement))

@@ -237,7 +237,7 @@ class SubjectFolder:
                 f"{trial_path}/markers",
                 "a marker without a name",
                 LEFT_OUT,
-                f"{unnamed} markers",
+                f"{format_count(unnamed, 'marker')}",
             )
         plates = trial.read_force_plates()
         if plates.columns:

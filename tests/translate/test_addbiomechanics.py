@@ -76,7 +76,7 @@ def test_the_record_names_what_is_left_out(folder: Path) -> None:
         "1 of 40 frames"
     )
     assert records["/trials/walk_0/passes/0-kinematics", "pass"]["how"] == "dropped"
-    assert records["/trials/walk_0/markers", "marker"]["detail"] == "1 markers"
+    assert records["/trials/walk_0/markers", "marker"]["detail"] == "1 marker"
     point = records["/trials/walk_0/ground_forces", "center-of-pressure"]["errors"]["point"]
     # The force plates of the test are at a height of 0.01 m, the centres of pressure at 0.
     assert point["unit"] == "m" and point["max"] < 0.02

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from osimlite.base.text import format_count
 from osimlite.io.b3d.wire import BYTES, FIXED64, DamagedMessageError, split_message
 from osimlite.mechanics.multibody.spatial import Array
 
@@ -78,7 +79,7 @@ def _find_layout(frame: memoryview) -> Layout:
             )
         if len(field.value) % NUMBER_BYTES:
             raise DamagedMessageError(
-                f"field {field.number} of a frame has {len(field.value)} bytes, which is no "
+                f"field {field.number} of a frame has {format_count(len(field.value), 'byte')}, which is no "
                 f"multiple of {NUMBER_BYTES}"
             )
         layout[field.number] = (field.offset, len(field.value))

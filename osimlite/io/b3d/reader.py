@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from osimlite.base.files import expect_size, open_file
+from osimlite.base.text import format_count
 from osimlite.errors import DocumentError
 from osimlite.io.b3d.messages import HEADER, VERSION
 from osimlite.io.b3d.subject import RETRY, B3dPass, B3dSubject, B3dTrial, read_at
@@ -74,7 +75,8 @@ def read_b3d(path: str | Path) -> B3dSubject:
     # 3. Header and file must agree to the byte.
     if offset != size:
         raise DocumentError(
-            f"the file has {size} bytes, but its header describes {offset}; it was cut off or is damaged; {RETRY}",
+            f"the file has {format_count(size, 'byte')}, but its header describes {offset}; "
+            f"it was cut off or is damaged; {RETRY}",
             file=file,
         )
     subject.trials = tuple(trials)

@@ -17,6 +17,7 @@ import numpy as np
 
 from osimlite.base.files import open_file
 from osimlite.base.records import dataclass, field
+from osimlite.base.text import format_count
 from osimlite.errors import DocumentError, SettingError
 from osimlite.io.b3d.frames import decode_frames
 from osimlite.io.b3d.messages import (
@@ -484,7 +485,8 @@ class B3dSubject:
         )
         if len(names) != self.header["dof_count"]:
             raise DocumentError(
-                f"the frames have {self.header['dof_count']} coordinates, but the model of the pass has {len(names)}",
+                f"the frames have {format_count(self.header['dof_count'], 'coordinate')}, "
+                f"but the model of the pass has {len(names)}",
                 file=str(self.path),
             )
         return names
@@ -515,7 +517,7 @@ class B3dSubject:
         for name, size in self._field_sizes.items():
             if name in block and block[name].shape[1] != size:
                 raise DamagedMessageError(
-                    f"'{name}' has {block[name].shape[1]} numbers instead of {size}"
+                    f"'{name}' has {format_count(block[name].shape[1], 'number')} instead of {size}"
                 )
 
 

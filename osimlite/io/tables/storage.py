@@ -281,7 +281,7 @@ def _format_lines(
         if size > 1:
             if len(words) % size:
                 raise OsimliteError(
-                    f"a row has {len(words)} numbers, which cannot be divided into values of {size} numbers"
+                    f"a row has {format_count(len(words), 'number')}, which cannot be divided into values of {size} numbers"
                 )
             words = [",".join(words[start : start + size]) for start in range(0, len(words), size)]
         yield "\t".join((format_number(time), *words)) + "\n"

@@ -59,7 +59,7 @@ def report_start_off_equilibrium(subject: Subject, report: FindingCollector) -> 
         ):
             report(
                 f"{describe_object(muscle)} does not start in equilibrium: its fiber length is "
-                f"{length:.3g} optimal lengths (in equilibrium {equilibrium_length:.3g}), its tendon force "
+                f"{length:.3g} times its optimal length (in equilibrium {equilibrium_length:.3g}), its tendon force "
                 f"{tension:.3g} times max_isometric_force (in equilibrium {equilibrium_tension:.3g})",
                 muscle,
                 tag="default_fiber_length" if hasattr(muscle, "default_fiber_length") else None,

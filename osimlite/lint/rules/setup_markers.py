@@ -91,7 +91,7 @@ def report_marker_not_measured(setup: Setup, report: FindingCollector) -> None:
         if 3 * len(usable_tasks) + task_count < free_count:
             report(
                 f"{format_count(len(usable_tasks), 'marker')} and {format_count(task_count, 'coordinate task')} do not "
-                f"determine the {free_count} free coordinates of the model",
+                f"determine the {format_count(free_count, 'free coordinate')} of the model",
                 user.ik_task_set,
             )
         for task in tasks:

@@ -14,6 +14,7 @@ from itertools import chain, combinations, pairwise, product
 from typing import TYPE_CHECKING, Any
 
 from osimlite.base.records import dataclass
+from osimlite.base.text import format_count
 from osimlite.errors import ModelError
 from osimlite.mechanics.kernels.functions import (
     FUNCTION_TYPE,
@@ -286,7 +287,8 @@ class MultivariatePolynomial(Multivariate):
         )
         if len(powers) != len(coefficients):
             raise ModelError(
-                f"a polynomial of {dimension} variables up to order {order} has {len(powers)} coefficients; "
+                f"a polynomial of {format_count(dimension, 'variable')} up to order {order} has "
+                f"{format_count(len(powers), 'coefficient')}; "
                 f"got {len(coefficients)}"
             )
         return cls(tuple(coefficients), powers, opensim_derivatives)

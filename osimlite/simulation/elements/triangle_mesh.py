@@ -143,9 +143,9 @@ class TriangleMesh:
             )
         result = cls(points, triangles)
         if not np.all(result.areas > 0.0):
-            flat = np.count_nonzero(~(result.areas > 0.0))
+            flat = int(np.count_nonzero(~(result.areas > 0.0)))
             raise ModelError(
-                f"the mesh has {flat} triangles without area; remove them in a mesh program",
+                f"the mesh has {format_count(flat, 'triangle')} without area; remove them in a mesh program",
                 file=file,
             )
         corners = result.corners

@@ -266,7 +266,7 @@ def round_cycle(search: CycleSearch, model_cycle: ModelCycle, digits: int) -> Mo
         )
     except OsimliteError as error:
         raise SimulationError(
-            f"with parameters that are rounded to {digits} digits, there is no gait cycle; keep more digits "
+            f"with parameters that are rounded to {format_count(digits, 'digit')}, there is no gait cycle; keep more digits "
             f"(--digits, digits=). {error.message}"
         ) from None
 

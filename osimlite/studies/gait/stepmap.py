@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from osimlite.base.records import dataclass
-from osimlite.base.text import join_words
+from osimlite.base.text import format_count, join_words
 from osimlite.errors import OsimliteError, UnsupportedError
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.simulation.batches import BatchEngine, Floats, Ints, Watch, run_many
@@ -152,7 +152,7 @@ class StepMap:
         )
         if rebuilt.neutral.shape != self.neutral.shape:
             raise OsimliteError(
-                f"'{engine.mechanism.name}' has {rebuilt.neutral.shape[1]} neutral directions where it had "
+                f"'{engine.mechanism.name}' has {format_count(rebuilt.neutral.shape[1], 'neutral direction')} where it had "
                 f"{self.neutral.shape[1]} before its numbers changed"
             )
         projected_basis = self.basis - rebuilt.neutral @ (rebuilt.neutral.T @ self.basis)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from osimlite.base.named_tuples import NamedTuple
+from osimlite.base.text import format_count
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.link_motion import locate_mass_centers, locate_station
 
@@ -85,7 +86,8 @@ class GaitMeasures(NamedTuple):
             strides = self.strides
             left, right = (100.0 * fraction for fraction in strides.stance)
             texts["strides"] = (
-                f"{strides.number}, of {strides.time:.3f} s and {strides.length:.3f} m; {strides.touches} steps without scuffs"
+                f"{strides.number}, of {strides.time:.3f} s and {strides.length:.3f} m; "
+                f"{format_count(strides.touches, 'step')} without scuffs"
             )
             texts["stance"] = (
                 f"left foot {left:.1f} % of a stride, right foot {right:.1f} %; both feet {100.0 * strides.both:.1f} %"

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from osimlite.base.records import dataclass
-from osimlite.base.text import join_words, suggest_or_list
+from osimlite.base.text import format_count, join_words, suggest_or_list
 from osimlite.errors import SettingError, SimulationError
 from osimlite.io.document.reader import read
 from osimlite.io.tables.storage import StoTable, read_sto
@@ -265,7 +265,9 @@ class Scenario:
         parameters = Parameters(values, count)
         for name, value in values.items():
             if np.shape(value) not in ((), (count,)):
-                raise SettingError(f"'{name}' has {np.size(value)} values for {count} candidates")
+                raise SettingError(
+                    f"'{name}' has {format_count(np.size(value), 'value')} for {format_count(count, 'candidate')}"
+                )
         candidates = Candidates(self, parameters, length)
         for name in values:
             if name not in parameters.requested and name not in self.initial:

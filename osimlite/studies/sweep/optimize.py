@@ -299,7 +299,8 @@ def _open_history(
         # A smaller budget must not discard finished evaluations.
         if earlier_table.num_rows > evaluations.budget:
             raise SettingError(
-                f"'{path}' has {earlier_table.num_rows} runs of this search, more than the budget now; keep them with "
+                f"'{path}' has {format_count(earlier_table.num_rows, 'run')} of this search, "
+                f"more than the budget now; keep them with "
                 "--resume, or replace them with --force"
             )
     if not force and not path.exists() and not get_partial_path(path).exists():

@@ -13,6 +13,7 @@ import numpy as np
 from osimlite.base.lazy import make_notebook_repr
 from osimlite.base.pools import Pool
 from osimlite.base.records import dataclass, field
+from osimlite.base.text import format_count
 from osimlite.errors import OsimliteError, SettingError
 from osimlite.simulation.interrupts import defer_sigint
 from osimlite.studies.sweep.plan import Plan
@@ -176,7 +177,7 @@ def sweep(
             partial.finish()
         except KeyboardInterrupt:
             raise describe_interruption(
-                partial, f"{partial.rows} of {samples.count} runs"
+                partial, f"{partial.rows} of {format_count(samples.count, 'run')}"
             ) from None
         finally:
             partial.close()

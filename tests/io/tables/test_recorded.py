@@ -127,7 +127,7 @@ def test_what_is_no_motion_is_refused(arm, tmp_path: Path):
     path = tmp_path / "motion.mot"
     write_sto(path, "motion", [0.0, 0.1], ("knee",), [[1.0], [2.0]])
     with pytest.raises(
-        DocumentError, match="no column is a coordinate of 'arm'; its coordinates are shoulder_0"
+        DocumentError, match="no column is a coordinate of 'arm', which has shoulder_0"
     ):
         RecordedMotion.read(arm, path)
     with pytest.raises(ModelError, match="'stone' has no coordinates"):

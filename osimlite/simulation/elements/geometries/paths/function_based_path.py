@@ -179,7 +179,7 @@ def read_function_path(builder: ElementBuilder, owner: Any) -> CoordinatePath:
     moment_arm_functions = path.moment_arm_functions
     if moment_arm_functions and len(moment_arm_functions) != count:
         raise ModelError(
-            f"'{where}' has {len(moment_arm_functions)} moment_arm_functions for "
+            f"'{where}' has {format_count(len(moment_arm_functions), 'moment_arm_function')} for "
             f"{format_count(count, 'coordinate')}; give one for each, or none"
         )
     arms = tuple(
