@@ -242,15 +242,25 @@ def _interpolate_linearly(
         The function of time, and the first and last time (s).
 
     Raises:
-        SettingError: the lengths differ, a number is not finite, or times do not increase.
+        SettingError: times or values are not lists of numbers, their lengths differ, a number is not
+            finite, or times do not increase.
     """
-    x = np.asarray(times, dtype=float)
-    y = np.asarray(values, dtype=float)
+    try:
+        x, y = np.asarray(times, dtype=float), np.asarray(values, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise SettingError(
+            f"the control of '{name}' has a time or value that is not a number ({error}); correct it"
+        ) from None
+    if x.ndim != 1 or y.ndim != 1:
+        raise SettingError(
+            f"the control of '{name}' has times of shape {x.shape} and values of shape {y.shape}; "
+            "give two lists of numbers"
+        )
     if not x.size and not y.size:
         raise SettingError(
             f"the control of '{name}' has no times; give at least one time and value"
         )
-    if x.ndim != 1 or x.shape != y.shape:
+    if x.size != y.size:
         raise SettingError(
             f"the control of '{name}' has {format_count(x.size, 'time')}, but {format_count(y.size, 'value')}; "
             "give one value for each time"

@@ -163,6 +163,19 @@ def test_the_kernel_alone(model, code):
             "the control of 'second' has 2 times, but 1 value; give one value for each time",
         ),
         (
+            {"second": (0.5, 1.0)},
+            "the control of 'second' has times of shape () and values of shape (); give two lists of numbers",
+        ),
+        (
+            {"second": ([0.0, 1.0], [[1.0], [2.0]])},
+            "the control of 'second' has times of shape (2,) and values of shape (2, 1); give two lists of numbers",
+        ),
+        (
+            {"second": ([0.0, "soon"], [1.0, 2.0])},
+            "the control of 'second' has a time or value that is not a number "
+            "(could not convert string to float: 'soon'); correct it",
+        ),
+        (
             {"second": ([], [])},
             "the control of 'second' has no times; give at least one time and value",
         ),
