@@ -237,7 +237,7 @@ def add_muscle(draft: MjcfDraft, force: Muscle, path: str) -> str:
     draft.fidelity.add(
         "muscle",
         path,
-        f"{add_article(type(force).__name__)}: an elastic tendon, fibers at a changing angle, non-parabolic curves",
+        f"{add_article(type(force).__name__)}: {', '.join(_list_lost_features(force))}",
         "a MuJoCo muscle, "
         + (
             "fitted to the isometric force"
@@ -254,6 +254,17 @@ def add_muscle(draft: MjcfDraft, force: Muscle, path: str) -> str:
         {"isometric force": Error.measure(force_errors, "Fmax")} if len(force_errors) else {},
     )
     return f"actuator {name}"
+
+
+def _list_lost_features(force: Muscle) -> list[str]:
+    """Return what the muscle has and MuJoCo's muscle lacks."""
+    states = {*list_states(force)}
+    return [
+        # With a rigid tendon a muscle has no state of its fiber or tendon.
+        *(["an elastic tendon"] if states & {"fiber_length", "normalized_tendon_force"} else []),
+        *(["fibers at a changing angle"] if force.pennation_angle_at_optimal else []),
+        "non-parabolic curves",
+    ]
 
 
 def _select_tensions(tensions: Array, curves: Curves) -> NDArray[np.bool_]:

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 import osimlite
+from osimlite.base.text import add_article
+from osimlite.models.arm import arm
 from osimlite.schema.path_forces import PathSpring
 from osimlite.schema.paths import GeometryPath, PathPoint
 from osimlite.translate import to_mjcf
@@ -38,6 +40,28 @@ def test_fibers_and_tendons_keep_their_lengths(corpus):
             muscle.activation_time_constant,
             muscle.deactivation_time_constant,
         ]
+
+
+@pytest.mark.parametrize(
+    ("is_rigid", "angle", "features"),
+    [
+        (True, 0.0, "non-parabolic curves"),
+        (True, 0.3, "fibers at a changing angle, non-parabolic curves"),
+        (False, 0.0, "an elastic tendon, non-parabolic curves"),
+        (False, 0.3, "an elastic tendon, fibers at a changing angle, non-parabolic curves"),
+    ],
+)
+def test_the_account_names_only_what_a_muscle_has(is_rigid, angle, features):
+    model = arm()
+    muscle = model["/forceset/flexor"]
+    muscle.ignore_tendon_compliance = is_rigid
+    muscle.pennation_angle_at_optimal = angle
+    (record,) = [
+        record
+        for record in to_mjcf(model, visuals=False).fidelity
+        if (record.kind, record.component) == ("muscle", "/forceset/flexor")
+    ]
+    assert record.cannot_say == f"{add_article(type(muscle).__name__)}: {features}"
 
 
 @pytest.mark.parametrize("activation", [0.0, 0.3, 1.0])
