@@ -26,11 +26,25 @@ from osimlite import (
     Sine,
     SpringGeneralizedForce,
 )
-from osimlite.errors import OsimliteError, SimulationError
+from osimlite.errors import OsimliteError, SettingError, SimulationError
 from osimlite.translate.mjcf.driven import COMPUTED_NOTE
 from tests.translate.mjcf.support import assert_refused, chain, coupled, on_a_function
 
 SPLINE = SimmSpline(x=(-1.0, 0.0, 0.5, 1.2, 2.0), y=(0.1, 0.3, 0.2, 0.25, 0.4))
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"timestep": -1.0}, "'timestep' must be a positive number of s, not -1"),
+        ({"timestep": float("nan")}, "'timestep' must be a positive number of s, not nan"),
+        ({"integrator": "rk4"}, "MuJoCo has no integrator 'rk4'; did you mean 'RK4'?"),
+    ],
+)
+def test_settings_that_mujoco_would_accept_silently_are_refused(options, message):
+    with pytest.raises(SettingError) as caught:
+        osimlite.mjcf.Driver(chain(), **options)
+    assert caught.value.message == message
 
 
 def test_the_walker_walks_as_in_opensim(fixtures):

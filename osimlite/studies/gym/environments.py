@@ -12,6 +12,7 @@ from gymnasium.vector import AutoresetMode
 
 from osimlite.base.records import replace
 from osimlite.base.text import suggest_name, suggest_or_list
+from osimlite.errors import SettingError
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.copies import Copies
 from osimlite.studies.gym.tasks import TASKS, Observation, Task, make_task
@@ -37,6 +38,12 @@ class _ObservedCopies:
     """
 
     def __init__(self, task: Task, count: int) -> None:
+        for name in ("seconds", "step"):
+            duration = getattr(task, name)
+            if not 0.0 < duration < np.inf:
+                raise SettingError(f"'{name}' must be a positive number, not {duration:g}")
+        if count < 1:
+            raise SettingError(f"'num_envs' must be at least 1, not {count}")
         self.task, self.count = task, count
         self.copies = Copies(task.model(), count, task.step, task)
         simulation = self.copies.simulation
@@ -104,20 +111,28 @@ class _ObservedCopies:
         )
         return np.clip(states, -OBSERVATION_LIMIT, OBSERVATION_LIMIT).astype(np.float32)
 
-    def step(self, actions: Any) -> tuple[Array, Any]:
+    def step(self, actions: Any, ignored_rows: Any = ()) -> tuple[Array, Any]:
         """Hold controls for a step.
 
         Args:
             actions: controls (w, c), which are clipped to their bounds.
+            ignored_rows: indices of the copies whose actions do not matter.
 
         Returns:
             Rewards (w,), and whether each copy has failed (w,).
         """
-        values = np.asarray(actions, dtype=float)
+        values = np.array(actions, dtype=float)
         expected = self.count, len(self.copies.controls)
         if values.shape != expected:
             raise gymnasium.error.InvalidAction(
                 f"actions have the shape {expected}, not {values.shape}"
+            )
+        values[np.asarray(ignored_rows, dtype=int)] = 0.0
+        # With NaN the motion would be computed as if it had failed, and the learner would not notice.
+        if np.isnan(values).any():
+            copy_index, index = np.argwhere(np.isnan(values))[0]
+            raise gymnasium.error.InvalidAction(
+                f"the action for '{self.copies.controls[index]}' of copy {copy_index} is NaN; give a number"
             )
         controls = np.clip(values, *self._limits)
         observation_before = self.observe(controls)
@@ -346,7 +361,7 @@ class MuscleVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         restarted_rows = np.flatnonzero(self._ended)
         # All copies are stepped, then those with a new episode are set to their initial state.
         initial = {int(k): self._reset_state(int(k)) for k in restarted_rows}
-        rewards, has_failed = self._all.step(actions)
+        rewards, has_failed = self._all.step(actions, restarted_rows)
         for k, state in initial.items():
             self._all.copies.set_states(k, state)
         self._steps += 1

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from osimlite.base.records import dataclass
+from osimlite.base.text import suggest_or_list
+from osimlite.errors import SettingError
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.models.arm import arm as arm_model
 from osimlite.models.jumper import jumper
@@ -34,7 +36,12 @@ class Observation:
     step: float
 
     def __getitem__(self, name: str) -> Array:
-        return self.columns[name]
+        try:
+            return self.columns[name]
+        except KeyError:
+            raise SettingError(
+                f"the environment has no state '{name}'{suggest_or_list(name, self.columns)}"
+            ) from None
 
 
 @dataclass(frozen=True, eq=False)

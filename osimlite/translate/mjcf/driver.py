@@ -14,12 +14,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
 from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.require import require
+from osimlite.base.text import suggest_or_list
+from osimlite.errors import SettingError
 from osimlite.mechanics.kernels.layout import ITEM, MODEL
 from osimlite.mechanics.multibody.functions import ConstantValue, Polynomial, SmoothFunction
 from osimlite.mechanics.multibody.mechanism import Values
@@ -102,6 +104,7 @@ class Driver:
 
     Raises:
         MissingDependency: mujoco is not installed.
+        SettingError: the time step is not positive, or the integrator is unknown.
         ModelError: the model is not a valid mechanism.
         UnsupportedError: a joint or constraint is not supported.
     """
@@ -118,6 +121,11 @@ class Driver:
         geometry: Sequence[str | Path] = (),
     ) -> None:
         self._mujoco: Any = require("mujoco", extra="mujoco", purpose="the driver of MuJoCo")
+        if not 0.0 < timestep < np.inf:
+            raise SettingError(f"'timestep' must be a positive number of s, not {timestep:g}")
+        if integrator not in get_args(Integrator):
+            suggestion = suggest_or_list(integrator, get_args(Integrator))
+            raise SettingError(f"MuJoCo has no integrator '{integrator}'{suggestion}")
         version: Version = 3 if self._mujoco.__version__.startswith("3.") else 4
         self.mjcf = to_mjcf(model, mujoco=version, driver=True, folder=folder, geometry=geometry)
         if file is None:

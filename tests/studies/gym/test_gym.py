@@ -11,7 +11,7 @@ from gymnasium.utils.env_checker import check_env  # noqa: E402
 
 import osimlite  # noqa: E402
 from osimlite.base.records import replace  # noqa: E402
-from osimlite.errors import OsimliteError  # noqa: E402
+from osimlite.errors import OsimliteError, SettingError  # noqa: E402
 from osimlite.simulation.options import INTEGRATORS  # noqa: E402
 from osimlite.studies.gym.environments import MuscleEnv, MuscleVectorEnv  # noqa: E402
 from osimlite.studies.gym.tasks import TASKS  # noqa: E402
@@ -139,6 +139,46 @@ def test_any_model_has_a_task(tmp_path) -> None:
 def test_what_an_environment_does_not_know_is_refused(choices, words) -> None:
     with pytest.raises(gymnasium.error.Error, match=words):
         gymnasium.make("osimlite/Arm-v0", **choices).unwrapped.close()
+
+
+@pytest.mark.parametrize(
+    "choice", [{"seconds": -1}, {"seconds": float("nan")}, {"step": 0.0}, {"step": float("inf")}]
+)
+def test_durations_are_positive(choice) -> None:
+    (name,) = choice
+    with pytest.raises(SettingError, match=f"'{name}' must be a positive number, not"):
+        gymnasium.make("osimlite/Arm-v0", **choice)
+
+
+def test_there_is_at_least_one_copy() -> None:
+    with pytest.raises(SettingError, match="'num_envs' must be at least 1, not -1"):
+        gymnasium.make_vec("osimlite/Arm-v0", num_envs=-1)
+
+
+def test_actions_that_are_no_numbers_are_refused() -> None:
+    action = np.array([0.1, np.nan])
+    env = gymnasium.make("osimlite/Arm-v0").unwrapped
+    env.reset(seed=0)
+    with pytest.raises(gymnasium.error.InvalidAction, match=r"'/forceset/\w+' of copy 0 is NaN"):
+        env.step(action)
+    env.close()
+    envs = gymnasium.make_vec("osimlite/Arm-v0", num_envs=2, seconds=0.01).unwrapped
+    envs.reset(seed=0)
+    actions = np.stack((np.zeros(2), action))
+    with pytest.raises(gymnasium.error.InvalidAction, match="of copy 1 is NaN"):
+        envs.step(actions)
+    assert envs.step(np.zeros((2, 2)))[3].all()
+    # This step starts new episodes, and ignores the actions.
+    envs.step(actions)
+    envs.close()
+
+
+def test_a_reward_that_misspells_a_state_names_the_nearest() -> None:
+    env = gymnasium.make("osimlite/Arm-v0", reward=lambda before, after: after["elbo"]).unwrapped
+    env.reset(seed=0)
+    with pytest.raises(SettingError, match=r"has no state 'elbo'; did you mean 'elbow'\?"):
+        env.step(np.zeros(2))
+    env.close()
 
 
 def test_a_task_can_be_another_in_parts() -> None:
