@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from osimlite.base.records import dataclass, field
 from osimlite.base.text import join_words, suggest_name
-from osimlite.errors import ModelError
+from osimlite.errors import ModelError, SettingError
 from osimlite.mechanics.multibody.constraints import ConstraintEquations, Lock, PrescribedCoordinate
 from osimlite.mechanics.multibody.extremes import methods_of_any_numbers
 from osimlite.mechanics.multibody.parts import (
@@ -196,6 +196,7 @@ class MechanismStructure:
 
         Raises:
             ModelError: a name is unknown, or the number of values is wrong.
+            SettingError: a value is not a number.
         """
         count = len(self.coordinates)
         # The usual case, in which simulations call, is not converted.
@@ -204,9 +205,20 @@ class MechanismStructure:
         if isinstance(values, Mapping):
             result = np.array(defaults, dtype=float) if defaults else np.zeros(count)
             for name, value in values.items():
-                result[self.coordinate_index(name)] = value
+                index = self.coordinate_index(name)
+                try:
+                    result[index] = float(value)
+                except (TypeError, ValueError):
+                    raise SettingError(
+                        f"coordinate '{name}' takes one number as its {quantity}, not {value!r}"
+                    ) from None
             return result
-        result = np.asarray(values, dtype=float)
+        try:
+            result = np.asarray(values, dtype=float)
+        except (TypeError, ValueError):
+            raise SettingError(
+                f"'{self.name}' takes one {quantity} for each of its coordinates ({count}), as numbers"
+            ) from None
         if result.shape != (count,):
             raise ModelError(
                 f"'{self.name}' takes one {quantity} for each of its coordinates ({count}), in their order; "

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 
-from osimlite.errors import ModelError
+from osimlite.errors import ModelError, SettingError
 from osimlite.mechanics.multibody.dynamics import Wrench
 from osimlite.mechanics.multibody.mechanism import FramePlacement, Mechanism
 from osimlite.mechanics.multibody.spatial import make_offset
@@ -61,7 +61,7 @@ def test_two_coordinates_with_one_name_are_told_apart_by_their_paths():
         ),
         (
             lambda tree: tree.mass_matrix([1.0, 2.0]),
-            "one value for each of its 24 coordinates.*got 2",
+            r"one value for each of its coordinates \(24\).*got 2",
         ),
         (lambda tree: tree.mass_matrix(0.0), "got a single one"),
         (lambda tree: tree.bias(np.zeros(24), np.zeros((24, 1))), "one speed.*got 24 × 1"),
@@ -93,6 +93,19 @@ def test_two_coordinates_with_one_name_are_told_apart_by_their_paths():
 def test_what_is_not_there_is_named(call, words):
     with pytest.raises(ModelError, match=words):
         call(mixed_tree())
+
+
+def test_values_that_are_no_numbers_are_refused():
+    tree = mixed_tree()
+    for value in ("x", None, [1.0, 2.0]):
+        with pytest.raises(
+            SettingError, match="coordinate 'b2' takes one number as its value, not"
+        ):
+            tree.mass_matrix({"b2": value})
+    with pytest.raises(
+        SettingError, match=r"takes one value for each of its coordinates .* numbers"
+    ):
+        tree.mass_matrix(["x"] * len(tree.coordinates))
 
 
 def test_bodies_must_follow_their_carriers():
