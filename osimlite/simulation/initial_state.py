@@ -10,12 +10,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from osimlite.base.quantity import Quantity, describe_unit_mistake, parse_quantity
+from osimlite.base.text import join_words
 from osimlite.errors import DocumentError, SettingError, SimulationError
 from osimlite.io.tables.storage import StoTable, read_sto
 from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.schema.tree import is_a
 
 if TYPE_CHECKING:
     from osimlite.mechanics.multibody.parts import CoordinateInfo
+    from osimlite.schema.model import Model
     from osimlite.simulation.trajectory import Trajectory
 
 
@@ -39,8 +42,12 @@ def convert_value(
     """
     motion_type = mechanism.coordinates[mechanism.coordinate_index(name)].motion_type
     if not isinstance(value, str):
-        return float(value)
-    quantity = parse_quantity(value)
+        try:
+            return float(value)
+        except (TypeError, ValueError):
+            quantity = None
+    else:
+        quantity = parse_quantity(value)
     if quantity is None:
         raise SettingError(
             f"coordinate '{name}' takes a number such as 0.5 or 30deg, not '{value}'"
@@ -77,6 +84,54 @@ def describe_suspect_value(info: CoordinateInfo, name: str, value: float | str) 
         parse_quantity(value) if isinstance(value, str) else Quantity(float(value), None),
         info.range,
     )
+
+
+def convert_state(path: str, value: float | str) -> float:
+    """Convert the value of a state without a unit to a number.
+
+    Args:
+        path: path of the state.
+        value: a number, or a text.
+
+    Raises:
+        SettingError: the text is not a number.
+    """
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise SettingError(f"the state '{path}' takes a number, not '{value}'") from None
+
+
+def describe_suspect_activations(model: Model, initial: Mapping[str, float | str]) -> str:
+    """Return a warning if activations of muscles are outside 0 to 1, which OpenSim accepts.
+
+    Args:
+        model: the model.
+        initial: values by the paths of states and the names of coordinates.
+
+    Returns:
+        A sentence, or "" if all activations are plausible.
+    """
+    outside = [path for path, value in initial.items() if _is_outside_activation(path, value)]
+    if not outside:
+        return ""
+    tree = model.tree()
+    # Activations of other actuators, as of an ActivationCoordinateActuator, have no such range.
+    muscles = [
+        f"'{path}' = {float(initial[path]):g}"
+        for path in outside
+        if is_a(tree.find(path.rpartition("/")[0]), "Muscle")
+    ]
+    return (
+        f"activations of muscles are 0 to 1, but the initial value is {join_words(muscles, max_count=3)}"
+        if muscles
+        else ""
+    )
+
+
+def _is_outside_activation(path: str, value: float | str) -> bool:
+    """Return whether a state is an activation, and its value a number outside 0 to 1."""
+    return path.endswith("/activation") and not 0.0 <= convert_state(path, value) <= 1.0
 
 
 def resolve_initial_values(

@@ -26,7 +26,9 @@ from osimlite.simulation.elements.controls import Controls
 from osimlite.simulation.engines import engine_factory
 from osimlite.simulation.engines.protocol import Engine, EngineSettings
 from osimlite.simulation.initial_state import (
+    convert_state,
     convert_value,
+    describe_suspect_activations,
     describe_suspect_value,
     extract_state,
     read_earlier_run,
@@ -209,19 +211,22 @@ class Simulation:
             raise SettingError("showing the motion needs a fixed step, for instance 0.001 s")
         if isinstance(initial, str | Path):
             initial = self.read_state(initial)
-        for name, value in (initial or {}).items():
+        requested = initial or {}
+        initial, initial_speeds = (
+            {
+                name: convert_state(name, value)
+                if name in self.paths
+                else convert_value(self.mechanism, name, value, is_speed=is_speed)
+                for name, value in numbers.items()
+            }
+            for numbers, is_speed in ((requested, False), (options.initial_speeds or {}, True))
+        )
+        for name, value in requested.items():
             if name not in self.paths:
                 info = self.mechanism.coordinates[self.mechanism.coordinate_index(name)]
                 warn_of_unit(describe_suspect_value(info, name, value))
-        initial, initial_speeds = (
-            {
-                name: float(value)
-                if name in self.paths
-                else convert_value(self.mechanism, name, value, is_speed=is_speed)
-                for name, value in (numbers or {}).items()
-            }
-            for numbers, is_speed in ((initial, False), (options.initial_speeds, True))
-        )
+        if message := describe_suspect_activations(self.model, requested):
+            warn_caller(message)
         controls = self.forces.controls
         extra_settings = {}
         if options.controls is not None or any(controls.functions):

@@ -28,6 +28,7 @@ from osimlite.errors import (
     SimulationError,
     UnsupportedError,
 )
+from osimlite.models.arm import arm
 from osimlite.schema.contact_forces import ExponentialContactForce
 from osimlite.simulation import Interrupted, Simulation, read_sto
 from osimlite.simulation.engines.batch import BatchWorkspace
@@ -68,6 +69,7 @@ def test_what_is_set_may_carry_a_unit(walker):
     for given, words in (
         ({"RHip_rz": "4 cm"}, "give '4 cm' in deg or rad"),
         ({"RHip_rz": "far"}, "such as 0.5 or 30deg"),
+        ({"RHip_rz": None}, "such as 0.5 or 30deg, not 'None'"),
     ):
         with pytest.raises(SettingError, match=words):
             osimlite.simulate(walker, to=0.01, initial=given)
@@ -86,6 +88,17 @@ def test_degrees_taken_for_radians_are_warned_of(walker):
         initial={"RHip_rz": "500deg", "Pelvis_tx": 9},
         initial_speeds={"RHip_rz": 40},
     )
+
+
+def test_activations_that_no_muscle_has_are_warned_of():
+    model = arm()
+    path = "/forceset/flexor/activation"
+    for value, words in ((3, "= 3"), ("-0.5", "= -0.5")):
+        with pytest.warns(DoubtfulWarning, match=rf"are 0 to 1, .*'{path}' {words}$"):
+            osimlite.simulate(model, to=0.001, initial={path: value})
+    osimlite.simulate(model, to=0.001, initial={path: 1.0})
+    with pytest.raises(SettingError, match=f"the state '{path}' takes a number, not 'high'"):
+        osimlite.simulate(model, to=0.001, initial={path: "high"})
 
 
 def test_locked_coordinate_keeps_its_value(walker):
