@@ -62,7 +62,7 @@ PAGES = {
     "osimlite.io.meshes": "docs/viewer.md#meshes",
     "osimlite.models.source": "docs/errors.md#models-from-python-yaml-and-json",
     "osimlite.fitting.modifying": "docs/modifying.md",
-    "osimlite.mechanics.multibody": "docs/constraints.md",
+    "osimlite.mechanics.multibody": "docs/constraints.md#models-that-are-rejected",
     "osimlite.mechanics.multibody.assembly": "docs/constraints.md#assemble-the-initial-state",
     "osimlite.mechanics.multibody.mechanism": "docs/from-opensim.md#kinematics-and-dynamics",
     "osimlite.mechanics.multibody.structure": "docs/from-opensim.md#kinematics-and-dynamics",
