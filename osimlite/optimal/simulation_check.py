@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from osimlite.base.deprecation import make_deprecated_property
 from osimlite.base.records import dataclass
 from osimlite.errors import OsimliteError
 from osimlite.mechanics.multibody.spatial import Array
@@ -31,6 +32,8 @@ class SimulationCheck:
 
     times: Array
     deviations: dict[str, Array]
+
+    apart = make_deprecated_property("deviations")
 
     @property
     def largest(self) -> Array:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from osimlite.base.deprecation import make_deprecated_property
 from osimlite.base.files import prepare_folder, read_file, write_atomically
 from osimlite.base.records import dataclass
 from osimlite.base.text import format_count
@@ -70,6 +71,8 @@ class Gait:
     candidates: int
     cycles: int
     files: tuple[Path, ...]
+
+    found = make_deprecated_property("model_cycle")
 
 
 def find_gait(
