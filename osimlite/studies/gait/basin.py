@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from osimlite.base.records import dataclass
-from osimlite.errors import OsimliteError
+from osimlite.errors import ModelError, OsimliteError, SettingError
 from osimlite.simulation.batches import BatchEngine, Floats, Ints
 from osimlite.studies.gait.cycle import Cycle
 from osimlite.studies.gait.starts import lift_to_depth
@@ -226,11 +226,11 @@ def find_basin_offsets(
         Offsets in the state; None for a default.
 
     Raises:
-        OsimliteError: there is no such coordinate, it is locked, or both are the same.
+        SettingError: there is no such coordinate, it is locked, or both are the same.
     """
     offsets = _find_index(engine, x) if x else None, _find_index(engine, y) if y else None
     if offsets[0] is not None and offsets[0] == offsets[1]:
-        raise OsimliteError(
+        raise SettingError(
             f"'{x}' and '{y}' are the same variable; a basin needs two different ones"
         )
     return offsets
@@ -240,9 +240,13 @@ def _find_index(engine: BatchEngine, name: str) -> int:
     """Return the index in the state of a coordinate, or of its speed (`NAME/speed`)."""
     coordinate, slash, quantity = name.rpartition("/")
     is_speed = bool(slash) and quantity == "speed"
-    coordinate_index = engine.mechanism.coordinate_index(coordinate if is_speed else name)
+    try:
+        coordinate_index = engine.mechanism.coordinate_index(coordinate if is_speed else name)
+    except ModelError as error:
+        # The name is wrong and not the model.
+        raise SettingError(error.message) from None
     if coordinate_index not in engine.order:
-        raise OsimliteError(f"'{name}' is locked; name a coordinate that moves")
+        raise SettingError(f"'{name}' is locked; name a coordinate that moves")
     return engine.order.index(coordinate_index) + (len(engine.order) if is_speed else 0)
 
 
