@@ -25,7 +25,12 @@ def find_gait(
         int, Option(min=1, metavar="N", help="Number of best walkers to refine to gait cycles.")
     ] = 40,
     enough: Annotated[
-        int, Option(min=1, metavar="N", help="Stop the search when N gait cycles are found.")
+        int,
+        Option(
+            min=1,
+            metavar="N",
+            help="Stop refining walkers when N gait cycles are found. Optimizing the stability finds more.",
+        ),
     ] = 5,
     budget: Annotated[
         int,
@@ -139,7 +144,8 @@ def _describe_result(gait: Gait) -> FactTable:
     )
     facts.add(
         "search",
-        f"{format_count(gait.candidates, 'random walker')} made two steps; {format_count(gait.cycles, 'cycle')} found",
+        f"{format_count(gait.candidates, 'random walker')} made two steps; {format_count(gait.cycles, 'cycle')} found, "
+        "including those of the stability optimization",
     )
     facts.add_files(gait.files)
     return facts

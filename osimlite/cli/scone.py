@@ -59,7 +59,8 @@ def scone(
         Option(
             "--to",
             metavar="SECONDS",
-            help="Duration of the simulation.",
+            help="Duration of the simulation. With --optimize, only of the last one, with the best parameters: "
+            "the duration of the candidates is max_duration of the scenario.",
             show_default="that of the scenario",
         ),
     ] = None,

@@ -102,7 +102,8 @@ def find_gait(
         feet: contacts of each foot; found from the structure of the model by default.
         samples: number of random walkers.
         tries: number of the best random walkers from which a cycle is searched.
-        enough: number of cycles after which no more are searched.
+        enough: number of cycles after which no more walkers are refined; the optimization of the
+            stability finds more.
         budget: number of sets of numbers that the optimization of stability tries.
         stable: largest multiplier that is small enough; below it, the part of perturbed walkers
             that walk counts.
