@@ -244,7 +244,7 @@ def measure_subject(subject: Subject, *, compute: bool = True) -> str:
         if not isinstance(fault, ArithmeticError | ValueError):
             return str(getattr(error, "message", error))
         # Other rules report numbers with which nothing can be computed.
-        return f"a number is too large to compute with ({fault})"
+        return "a number is too large to compute with"
     subject.cache[MEASURES] = result
     if text_parts is not None:
         remember_measures(text_parts, result, subject.cache_folder)

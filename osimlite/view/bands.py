@@ -11,7 +11,7 @@ import numpy as np
 
 from osimlite.base.files import read_file
 from osimlite.base.named_tuples import NamedTuple
-from osimlite.base.text import join_words
+from osimlite.base.text import format_count, join_words
 from osimlite.errors import DocumentError, SettingError
 from osimlite.mechanics.multibody.spatial import Array
 
@@ -67,19 +67,29 @@ def read_bands(path: str | Path) -> dict[str, Band]:
             "for each point of the gait cycle",
             file=file,
         )
-    try:
-        numbers = np.array([[float(cell) for cell in row] for row in rows[1:]])
-    except ValueError as error:
-        raise DocumentError(f"expected numbers with equal columns: {error}", file=file) from None
-    if numbers.shape[1] != len(labels) or not (
-        np.isfinite(numbers).all() and (np.diff(numbers[:, 0]) > 0.0).all()
-    ):
+    for row in rows[1:]:
+        if len(row) != len(labels):
+            raise DocumentError(
+                f"a row has {format_count(len(row), 'cell')}, expected one for each of the "
+                f"{len(labels)} columns",
+                file=file,
+            )
+    numbers = np.array([[_to_number(cell, file) for cell in row] for row in rows[1:]])
+    if not (np.isfinite(numbers).all() and (np.diff(numbers[:, 0]) > 0.0).all()):
         raise DocumentError("expected finite numbers, and per cents that increase", file=file)
     columns = dict(zip(labels, numbers.T, strict=True))
     return {
         name: Band(numbers[:, 0], columns[f"{name}{MEAN}"], columns[f"{name}{DEVIATION}"], source)
         for name in names
     }
+
+
+def _to_number(cell: str, file: str) -> float:
+    """Return the number in a cell."""
+    try:
+        return float(cell)
+    except ValueError:
+        raise DocumentError(f"expected a number in each cell, found '{cell}'", file=file) from None
 
 
 def check_bands(bands: Mapping[str, Band], titles: Sequence[str], *, cyclic: bool) -> None:

@@ -46,9 +46,9 @@ def test_a_band_lies_behind_the_curves_of_its_panel(tmp_path: Path) -> None:
     [
         ("", "has no pair of a mean"),
         ("per cent, knee_mean\n0, 1\n1, 1\n", "'knee_sd' is missing"),
-        (TEXT.replace("20", "many"), "expected numbers"),
+        (TEXT.replace("20", "many"), "expected a number in each cell, found ' ?many'"),
         (TEXT.replace("50", "0"), "increase"),
-        (TEXT.replace("50, 20", "50"), "expected numbers"),
+        (TEXT.replace("50, 20", "50"), "a row has 2 cells, expected one for each of the 3 columns"),
     ],
 )
 def test_a_file_without_bands_is_an_error(tmp_path: Path, text: str, words: str) -> None:

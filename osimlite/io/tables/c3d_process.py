@@ -37,12 +37,22 @@ def run_process() -> None:
     # ezc3d raises whatever its standard library does, and a damaged header leads to any key or
     # index.
     except Exception as error:
-        reason = str(error) or type(error).__name__
-        is_reading_error = isinstance(error, OSError | RuntimeError | ValueError)
-        message = reason if is_reading_error else f"it is damaged ({reason})"
-        sys.stdout.buffer.write(json.dumps({"error": message}).encode())
+        sys.stdout.buffer.write(json.dumps({"error": describe_failure(error)}).encode())
         raise SystemExit(1) from None
     sys.stdout.buffer.write(buffer.getvalue())
+
+
+def describe_failure(error: Exception) -> str:
+    """Return the reason why a file cannot be read, without words of Python and of ezc3d's programmers."""
+    if isinstance(error, MemoryError):
+        return "reading it takes too much memory; it may be damaged"
+    # C++ adds this to the reason of every error of a stream.
+    reason = str(error).removesuffix(": iostream error")
+    if not isinstance(error, OSError | RuntimeError | ValueError) or not reason:
+        return "it is damaged: a part that its header or its parameters describe is missing"
+    if "ignoreBadFormatting" in reason:
+        return "it is damaged: its sections are not where the standard puts them"
+    return reason
 
 
 def read_markers(path: str) -> dict[str, Array]:

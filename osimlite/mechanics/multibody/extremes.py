@@ -50,7 +50,7 @@ def any_numbers(function: Callable[P, R]) -> Callable[P, R]:
                 "a number of the model",
             )
             raise ModelError(
-                f"{extreme_number} is too large or too small to compute with ({fault}); change this number"
+                f"{extreme_number} is too large or too small to compute with; change this number"
             ) from None
 
     return computing

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import subprocess
 import sys
 
 import numpy as np
 import pytest
+
+from osimlite.io.tables.c3d_process import describe_failure
 
 resource = pytest.importorskip("resource", reason="limits of processes are those of POSIX")
 
@@ -47,6 +50,26 @@ def test_limits_are_set_as_far_as_the_system_lets(lowest: str, seconds: int) -> 
     assert done.returncode == 0, done.stderr.decode()
     limits = np.load(io.BytesIO(done.stdout))["limits"].tolist()
     assert limits == [seconds, 4_000_000_000, 0]
+
+
+@pytest.mark.parametrize(
+    ("error", "reason"),
+    [
+        (IndexError("list index out of range"), "it is damaged: a part that its header"),
+        (KeyError("POINT"), "it is damaged: a part that its header"),
+        (MemoryError(), "reading it takes too much memory"),
+        (OSError("Parameter type unrecognized: iostream error"), "Parameter type unrecognized"),
+        (
+            OSError("... set ignoreBadFormatting to true: iostream error"),
+            "it is damaged: its sections",
+        ),
+        (ValueError("it names 0 of 2 markers"), "it names 0 of 2 markers"),
+    ],
+)
+def test_a_reason_has_no_words_of_python(error: Exception, reason: str) -> None:
+    message = describe_failure(error)
+    assert message.startswith(reason)
+    assert not re.search("index|KeyError|POINT|iostream|ignoreBad", message)
 
 
 @pytest.mark.parametrize(("time", "said"), [("nan", "its frames have no times"), ("x", "'x'")])
