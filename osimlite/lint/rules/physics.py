@@ -178,7 +178,8 @@ def report_limit_inside_range(subject: Subject, report: FindingCollector) -> Non
 
     Reports limits inside the range of the coordinate by more than the transition and by more than a
     quarter of the range. The finding is a warning if the default value of the coordinate is already
-    beyond the limit.
+    beyond the limit, or if the limits seem to be in radians. Without a range, or with one of more
+    than two turns, limits seem to be in radians if both are within 3.15 degrees.
 
     The model can reach a part of the range only against the spring of the limit force. If the
     default pose is beyond the limit, the force acts from the start. Note that limits are in degrees
@@ -191,6 +192,7 @@ def report_limit_inside_range(subject: Subject, report: FindingCollector) -> Non
       </CoordinateLimitForce>
     ```
     """
+    _report_limits_in_radians(subject, report)
     for force, coordinate, scale, low, high in _find_limits(subject):
         unit = "m" if scale == 1.0 else "deg"
         slack = max(abs(force.transition), subject.config.value_of(INSIDE) * (high - low)) + 1e-6
@@ -253,18 +255,58 @@ def _drives_sliding(subject: Subject, material: HuntCrossleyContactParameters) -
     return 2 * material.static_friction + viscous < material.dynamic_friction
 
 
+def _report_limits_in_radians(subject: Subject, report: FindingCollector) -> None:
+    """Report small limits of an angle that has no range, or a range that means none."""
+    widest = subject.config.value_of(UNLIMITED)
+    for force, coordinate, scale in _find_limited_coordinates(subject):
+        low, high = coordinate.range
+        has_range = "range" in coordinate.model_fields_set and abs(high - low) < widest
+        if scale == 1.0 or has_range:
+            continue
+        limits = force.lower_limit, force.upper_limit
+        is_explicit = {"lower_limit", "upper_limit"} <= force.model_fields_set
+        # Equal limits hold the coordinate in its place.
+        if is_explicit and limits[0] < limits[1] and max(map(abs, limits)) <= MAX_RADIANS:
+            report(
+                f"the limits of {describe_object(force)} for '{coordinate.name}', "
+                f"{format_quantity(limits[0])} and {format_quantity(limits[1], 'deg')}, are only "
+                f"{format_quantity(limits[1] - limits[0], 'deg')} apart; are they in radians?",
+                force,
+                tag="lower_limit",
+                severity=WARNING,
+                suggestion=f"{math.degrees(limits[0]):.6g}",
+            )
+
+
+MAX_RADIANS = 3.15
+"""Limit (degrees) up to which both limits of a joint are assumed to be in radians: half a turn."""
+
+
 def _find_limits(
     subject: Subject,
 ) -> Iterator[tuple[CoordinateLimitForce, Coordinate, float, float, float]]:
     """Yield limit forces with their coordinate, the factor to their unit, and the range in that unit.
 
-    Coordinates without a range are left out, and those whose meaning depends on the functions of their
-    joint.
+    Coordinates without a range are left out.
+    """
+    for force, coordinate, scale in _find_limited_coordinates(subject):
+        if "range" in coordinate.model_fields_set:
+            # A reversed range has OSIM511.
+            low, high = sorted(bound * scale for bound in coordinate.range)
+            yield force, coordinate, scale, low, high
+
+
+def _find_limited_coordinates(
+    subject: Subject,
+) -> Iterator[tuple[CoordinateLimitForce, Coordinate, float]]:
+    """Yield limit forces with their coordinate and the factor to their unit.
+
+    Coordinates whose meaning depends on the functions of their joint are left out.
     """
     spec = CoordinateLimitForce.field_specs()["coordinate"]
     for force in subject.find_instances(CoordinateLimitForce):
         coordinate = subject.tree.resolve(Use(force, force, spec, force.coordinate)).target
-        if not isinstance(coordinate, Coordinate) or "range" not in coordinate.model_fields_set:
+        if not isinstance(coordinate, Coordinate):
             continue
         joint = subject.tree.parent_of(coordinate)
         motion = (
@@ -273,7 +315,4 @@ def _find_limits(
             else None
         )
         if motion is not None:
-            scale = 180 / math.pi if motion == "rotational" else 1.0
-            # A reversed range has OSIM511.
-            low, high = sorted(bound * scale for bound in coordinate.range)
-            yield force, coordinate, scale, low, high
+            yield force, coordinate, 180 / math.pi if motion == "rotational" else 1.0
