@@ -8,7 +8,7 @@ splits intervals where the error is large. Each study is solved with refinement,
 limited-memory Hessians, and then with more and more equal intervals until their error is as small.
 
 The table in Markdown has the numbers of intervals (of each round of refinement), the largest error,
-the iterations of the last solve, the objective, and the processor time of the search. Each search
+the iterations on all meshes, the objective, and the processor time of the search. Each search
 has a process of its own.
 """
 
