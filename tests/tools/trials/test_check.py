@@ -243,5 +243,5 @@ def test_the_command_shows_verdicts_and_exits_as_validate(tmp_path: Path, capsys
 def test_a_folder_without_anything_of_a_trial_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(OsimliteError, match="this is not a trial"):
         osimlite.check_trial(tmp_path)
-    with pytest.raises(OsimliteError, match="does not exist"):
+    with pytest.raises(OsimliteError, match="no such file or folder"):
         osimlite.check_trial(tmp_path / "absent")
