@@ -129,7 +129,7 @@ def test_an_impossible_model_names_the_command_that_checks_it(setup: Path) -> No
     text = model.read_text()
     model.write_text(text.replace("<mass>", "<mas>", 1).replace("</mass>", "</mas>", 1))
     done = run("run", "setup.xml", folder=setup.parent)
-    assert done.code == 1 and "has mass nan" in done.err
+    assert done.code == 2 and "has mass nan" in done.err
     assert "'osimlite validate walker.osim' checks the model" in done.err
 
 
