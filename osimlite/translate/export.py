@@ -122,12 +122,14 @@ def to_urdf(
         name: name of the files without ending; by default that of the model.
 
     Raises:
-        OsimliteError: a limit is not a positive number, or `limits` has another value.
+        OsimliteError: a limit is not a positive number, or `limits` or `locked` has an unknown value.
         ModelError: the model is not a valid mechanism: a frame or body is missing or not connected.
         UnsupportedError: a joint or constraint is not supported.
     """
     if limits not in ("none", "range"):
         raise OsimliteError(f"limits must be 'none' or 'range', not '{limits}'")
+    if locked not in ("fixed", "joint"):
+        raise OsimliteError(f"locked must be 'fixed' or 'joint', not '{locked}'")
     for quantity, limit in (("effort", effort), ("velocity", velocity)):
         if limit is not None and not 0.0 < limit < math.inf:
             raise OsimliteError(

@@ -47,6 +47,11 @@ def test_settings_that_mujoco_would_accept_silently_are_refused(options, message
     assert caught.value.message == message
 
 
+def test_a_negative_number_of_steps_is_refused():
+    with pytest.raises(SettingError, match="the number of steps must be at least 0, not -5"):
+        osimlite.mjcf.Driver(chain()).step(-5)
+
+
 def test_the_walker_walks_as_in_opensim(fixtures):
     driver = osimlite.mjcf.Driver(
         osimlite.read(fixtures / "walker" / "DynamicWalkerModel.osim"), timestep=2e-4

@@ -118,6 +118,8 @@ def test_limits_locks_and_merging_on_demand():
 def test_messages_of_the_library_name_the_parameter_not_the_option():
     with pytest.raises(OsimliteError, match=r"^limits must be 'none' or 'range', not 'hard'$"):
         osimlite.to_urdf(dynamic_walker(), limits="hard")
+    with pytest.raises(OsimliteError, match=r"^locked must be 'fixed' or 'joint', not 'free'$"):
+        osimlite.to_urdf(dynamic_walker(), locked="free")
 
 
 def test_impossible_inertia_and_names_and_frames_are_told():

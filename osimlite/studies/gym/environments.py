@@ -59,6 +59,10 @@ class _ObservedCopies:
             *(f"{info.name}/speed" for info in order),
             *("/".join(path.split("/")[-2:]) for path in simulation.state.paths),
         ]
+        hidden: Any = task.hidden
+        # The letters of a text would be taken for names.
+        if isinstance(hidden, str):
+            raise SettingError(f"'hidden' must be a tuple of names, such as ('{hidden}',)")
         # A misspelt name would silently leave the coordinate visible.
         for name in task.hidden:
             if name not in self.state_names:

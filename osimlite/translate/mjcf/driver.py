@@ -226,8 +226,11 @@ class Driver:
             count: number of steps.
 
         Raises:
+            SettingError: the number is negative.
             SimulationError: a force has no value in a state that is reached.
         """
+        if count < 0:
+            raise SettingError(f"the number of steps must be at least 0, not {count}")
         with self._call_back():
             for _ in range(count):
                 self._mujoco.mj_step(self.model, self.data)

@@ -150,6 +150,11 @@ def test_durations_are_positive(choice) -> None:
         gymnasium.make("osimlite/Arm-v0", **choice)
 
 
+def test_one_hidden_name_is_no_tuple() -> None:
+    with pytest.raises(SettingError, match=r"'hidden' must be a tuple of names.*\('elbow',\)"):
+        gymnasium.make("osimlite/Arm-v0", hidden="elbow")
+
+
 def test_there_is_at_least_one_copy() -> None:
     with pytest.raises(SettingError, match="'num_envs' must be at least 1, not -1"):
         gymnasium.make_vec("osimlite/Arm-v0", num_envs=-1)
