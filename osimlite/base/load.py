@@ -160,7 +160,11 @@ def _is_users_module(spec: ModuleSpec | None) -> bool:
 
 @contextmanager
 def locate_errors(file: str) -> Iterator[None]:
-    """Raise errors of the user's code as OsimliteError with file and line."""
+    """Raise errors of the user's code as OsimliteError with file and line.
+
+    Raises:
+        OsimliteError: the code in the context raises an error.
+    """
     try:
         yield
     except OsimliteError as error:

@@ -51,14 +51,22 @@ class _NamedTupleMethods(tuple[Any, ...]):
 
     @classmethod
     def _make(cls, iterable: Iterable[Any]) -> Any:
-        """Return an object with the items of an iterable."""
+        """Return an object with the items of an iterable.
+
+        Raises:
+            TypeError: the iterable has more or fewer items than the class has fields.
+        """
         result = _new_tuple(cls, iterable)
         if len(result) != len(cls._fields):
             raise TypeError(f"Expected {len(cls._fields)} arguments, got {len(result)}")
         return result
 
     def _replace(self, /, **changes: Any) -> Any:
-        """Return a copy with new values of some items."""
+        """Return a copy with new values of some items.
+
+        Raises:
+            ValueError: the class has no field of a given name.
+        """
         result = self._make(map(changes.pop, self._fields, self))
         if changes:
             raise ValueError(f"Got unexpected field names: {list(changes)!r}")
@@ -97,7 +105,11 @@ def _compile_constructor(
 def _create_class(
     name: str, bases: tuple[type, ...], namespace: dict[str, Any], **keywords: Any
 ) -> type:
-    """Return the class that a class statement with the base `NamedTuple` declares."""
+    """Return the class that a class statement with the base `NamedTuple` declares.
+
+    Raises:
+        TypeError: a field without a default follows one with a default.
+    """
     bases = tuple(_NamedTupleMethods if base is _Declaration else base for base in bases)
     result: Any = type(name, bases, {**namespace, "__slots__": ()}, **keywords)
     fields = tuple(result.__annotations__)

@@ -164,7 +164,11 @@ class LocalPool:
 
 @contextmanager
 def _report_lost_workers() -> Iterator[None]:
-    """Raise WorkerLostError with advice if a process has ended."""
+    """Raise WorkerLostError with advice if a process has ended.
+
+    Raises:
+        WorkerLostError: a process of the pool has ended.
+    """
     try:
         yield
     except BrokenExecutor:
@@ -261,6 +265,12 @@ class ClusterPool:
 
         Returns:
             The tag of the task and its result.
+
+        Raises:
+            OsimliteError: the task crashed several workers, a worker cannot run it, or the task
+                itself raised the error.
+            ClusterLostError: the scheduler does not answer any more.
+            TimeoutError: no task finishes before `timeout` (s) ends.
         """
         from distributed.scheduler import KilledWorker
 
@@ -318,7 +328,11 @@ def _check_address(address: str) -> None:
 
 
 def _get_from_queue(queue: SimpleQueue[Any], timeout: float | None) -> Any:
-    """Return the next item of a queue; raise TimeoutError after the timeout."""
+    """Return the next item of a queue, and wait until there is one.
+
+    Raises:
+        TimeoutError: the queue has no item before the timeout (s) ends.
+    """
     from queue import Empty
 
     try:

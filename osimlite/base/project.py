@@ -67,7 +67,15 @@ def parse_max_file_size(file: Path, table: dict[str, Any]) -> int:
 
 
 def _read_settings(file: Path, *, is_dedicated: bool) -> dict[str, Any] | None:
-    """Return the table of osimlite in a file, which is the complete file if `is_dedicated` is true."""
+    """Return the table of osimlite in a file of settings; None if the file has none.
+
+    Args:
+        file: pyproject.toml, or a file for osimlite alone.
+        is_dedicated: whether the complete file is the table of osimlite.
+
+    Raises:
+        OsimliteError: the file is larger than `MAX_SETTINGS_BYTES`, or is not valid TOML.
+    """
     import tomllib
 
     text = read_at_most(file, MAX_SETTINGS_BYTES + 1)

@@ -97,7 +97,16 @@ def _open_nonblocking(path: str, flags: int) -> int:
 
 
 def _expect_regular(mode: int, path: str | Path) -> None:
-    """Raise an error unless a mode is that of a regular file."""
+    """Raise an error unless a mode is that of a regular file.
+
+    Args:
+        mode: mode of the path, from `os.stat`.
+        path: path of the file, for messages.
+
+    Raises:
+        MissingFileError: the mode is that of a folder.
+        SpecialFileError: the mode is that of a pipe, a device or a similar file.
+    """
     if stat.S_ISDIR(mode):
         raise MissingFileError(
             "cannot read the file: this is a folder; name a model file in it", file=str(path)

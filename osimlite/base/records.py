@@ -315,7 +315,11 @@ def _hash_record(self: Any) -> int:
 
 
 def _refuse_change(self: Any, name: str, *_: Any) -> None:
-    """Raise the error for a change of a frozen record."""
+    """Raise the error for a change of a frozen record.
+
+    Raises:
+        FrozenInstanceError: always.
+    """
     from dataclasses import FrozenInstanceError
 
     raise FrozenInstanceError(f"cannot change '{name}' of {type(self).__name__}")

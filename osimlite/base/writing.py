@@ -84,7 +84,15 @@ def write_atomically(path: str | Path, content: str | bytes) -> None:
 
 
 def encode_text(content: str, path: str | Path) -> bytes:
-    """Return a text in UTF-8; raise OsimliteError if it has lone surrogates."""
+    """Return a text in UTF-8.
+
+    Args:
+        content: text of the file.
+        path: path of the file, for messages.
+
+    Raises:
+        OsimliteError: the text has a lone surrogate, which UTF-8 cannot express.
+    """
     try:
         return content.encode()
     except UnicodeEncodeError as error:
@@ -279,7 +287,16 @@ def is_inside(path: str | Path, folders: Iterable[str | Path]) -> bool:
 
 
 def _expect_link_inside(path: str | Path, target: Path) -> None:
-    """Refuse a link that leads out of its project, or without a project out of its folder."""
+    """Refuse a link that leads out of its project, or without a project out of its folder.
+
+    Args:
+        path: path that the user named.
+        target: path with all links resolved.
+
+    Raises:
+        WriteRefusedError: the path is a link that leads out of its project, or without a project
+            out of its folder.
+    """
     if not os.path.islink(path) or os.path.abspath(path).startswith(("/dev/", "/proc/")):
         return
     folder = Path(os.path.realpath(os.path.dirname(os.path.abspath(path))))
@@ -291,7 +308,15 @@ def _expect_link_inside(path: str | Path, target: Path) -> None:
 
 
 def expect_regular_or_none(path: Path, *, links: bool = True) -> None:
-    """Refuse a path under which there is a folder, a pipe, a device or, unless allowed, a link."""
+    """Refuse a path under which there is a folder, a pipe, a device or, unless allowed, a link.
+
+    Args:
+        path: path of the file to write.
+        links: whether a symbolic link is allowed.
+
+    Raises:
+        OsimliteError: there is a folder, a pipe, a device or a forbidden link.
+    """
     try:
         mode = path.lstat().st_mode
     except OSError:
@@ -319,6 +344,10 @@ def _open_temporary(
         target_stat: status of the present file; None without one or if it may be replaced anyway.
         in_place: whether a file with several hard links, or whose owner cannot be copied, is
             overwritten instead of replaced.
+
+    Raises:
+        OsimliteError: the target is read-only, its folder does not exist, or the file cannot be
+            written.
     """
     # The mode counts too, because root may write read-only files.
     if target_stat is not None and not (target_stat.st_mode & 0o222 and os.access(target, os.W_OK)):
@@ -423,7 +452,12 @@ def prepare_folder(path: str | Path) -> Iterator[Path]:
 
 @contextmanager
 def _open_special(target: Path) -> Iterator[BinaryIO]:
-    """Yield a stream into a pipe or a device, without waiting for a reader of the pipe."""
+    """Yield a stream into a pipe or a device, without waiting for a reader of the pipe.
+
+    Raises:
+        OsimliteError: the target is a folder, no program reads from the pipe, or the device cannot
+            be written to.
+    """
     if target.is_dir():
         raise OsimliteError(
             "cannot write the file: this is a folder; name a file in it", file=str(target)
@@ -464,6 +498,9 @@ def _replace_file(name: str | Path, target: Path) -> bool:
 
     Returns:
         Whether the file was replaced.
+
+    Raises:
+        PermissionError: the file may not be renamed, and the target is not an existing file.
     """
     try:
         os.replace(name, target)

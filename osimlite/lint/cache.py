@@ -203,7 +203,17 @@ def describe_code_version() -> str:
 
 
 def _check_types(values: Any, *kinds: tuple[type, ...]) -> Any:
-    """Return a list after checking the types of its items; TypeError if it differs. Booleans are not numbers."""
+    """Return a list after checking the types of its items.
+
+    A boolean does not count as a number.
+
+    Args:
+        values: list from a cache entry.
+        kinds: permitted types of each item.
+
+    Raises:
+        TypeError: `values` is not a list of this length, or an item has another type.
+    """
     if type(values) is not list or len(values) != len(kinds):
         raise TypeError
     if not all(type(value) in kind for value, kind in zip(values, kinds, strict=True)):
@@ -246,7 +256,16 @@ def _dump_finding(finding: Finding) -> list[object]:
 
 
 def _parse_finding(file: str, values: Any) -> Finding:
-    """Return the finding from a list of `_dump_finding`; TypeError for anything else."""
+    """Return the finding from a list that `_dump_finding` has made.
+
+    Args:
+        file: file of the finding.
+        values: list from a cache entry.
+
+    Raises:
+        TypeError: the values are not those of a finding.
+        ValueError: the severity or the consequence is unknown.
+    """
     values = _check_types(values, *_FINDING)
     code, name, severity, message, line, column, length, component, suggestion, fix = values[:-1]
     consequence = values[-1]

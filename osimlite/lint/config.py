@@ -74,7 +74,11 @@ class Config:
 
 
 def _check_thresholds(thresholds: Mapping[str, float]) -> None:
-    """Raise an error for an unknown threshold, or for a value that is not a number of 0 or more."""
+    """Raise an error for an unknown threshold, or for a value that is not a number of 0 or more.
+
+    Raises:
+        OsimliteError: no rule has the threshold, or its value is not a number of 0 or more.
+    """
     from osimlite.base.text import suggest_name
     from osimlite.lint.registry import all_rules
 
@@ -101,6 +105,9 @@ def parse_codes(words: tuple[str, ...] | list[str] | str | None) -> tuple[str, .
 
     Returns:
         The codes and names.
+
+    Raises:
+        OsimliteError: no rule has one of the codes or names.
     """
     separate_words = (
         words.split(",")

@@ -40,7 +40,11 @@ class NewProperty(NamedTuple):
 
 @cache
 def load_later_changes(release: str) -> LaterChanges:
-    """Return the additions of the releases after one; OsimliteError if the release is unknown."""
+    """Return the additions of the releases of OpenSim after one.
+
+    Raises:
+        OsimliteError: the release is unknown.
+    """
     if release == NEWEST:
         return LaterChanges(CURRENT_VERSION, {}, {})
     import json

@@ -84,7 +84,15 @@ def load_settings(folder: Path) -> Settings:
 
 
 def _parse_settings(file: Path, table: dict[str, Any]) -> Settings:
-    """Return the checked settings of a configuration file."""
+    """Return the checked settings of a configuration file.
+
+    Args:
+        file: configuration file, for messages and as the start of relative paths.
+        table: settings in the file, by key.
+
+    Raises:
+        OsimliteError: a setting is unknown or has an invalid value.
+    """
     parse_max_file_size(file, table)
     for key in table:
         if key not in _SETTINGS:
