@@ -88,7 +88,12 @@ def _compute_target_values(
     times: Array,
     coordinates: StoTable | None,
 ) -> Array:
-    """Return the target values of a coordinate over time, rad or m."""
+    """Return the target values of a coordinate over time, rad or m.
+
+    Raises:
+        SettingError: the values are read from a file, but there is no file or it has no such
+            column.
+    """
     info = mechanism.coordinates[index]
     if task.value_type == "manual_value":
         return np.full(len(times), float(task.value))
@@ -120,7 +125,7 @@ def _compute_target_values(
 def run_inverse_kinematics(
     tool: InverseKinematicsTool, model: Model, data: MarkerData, coordinates: StoTable | None = None
 ) -> FittedMotion:
-    """Compute the motion of an InverseKinematicsTool.
+    """Return the motion that an InverseKinematicsTool computes from measured markers.
 
     Args:
         tool: setup of the tool.

@@ -160,7 +160,11 @@ def fit_motion(
         orientations: measured orientations of sensors; None without sensors.
         sensor_weights: weights of the sensors to fit, by name.
 
+    Returns:
+        Motion that fits best in each frame, with the errors of markers and sensors.
+
     Raises:
+        SimulationError: no pose satisfies the constraints.
         SettingError: markers and orientations have different times.
     """
     orientation_data = (

@@ -71,7 +71,7 @@ class MarkerData(Measurements):
 
 
 def read_trc(path: str | Path) -> MarkerData:
-    """Read the markers of a .trc file.
+    """Return the markers of a .trc file, in metres.
 
     An empty cell, or NaN, is a marker that was not seen.
 
@@ -125,7 +125,11 @@ def read_trc(path: str | Path) -> MarkerData:
 
 
 def _parse_number(cell: str, file: str, line: int, index: int) -> float:
-    """Return the number in a cell; NaN for an empty one."""
+    """Return the number in a cell; NaN for an empty one.
+
+    Raises:
+        DocumentError: the cell has other text than a number; with its line.
+    """
     text = cell.strip()
     try:
         return float(text) if text else np.nan
@@ -144,7 +148,9 @@ def _parse_number(cell: str, file: str, line: int, index: int) -> float:
 
 
 def read_sto_markers(path: str | Path) -> MarkerData:
-    """Read the markers of a table of Vec3 (.sto), or of three columns for each marker, in metres.
+    """Return the markers of a table (.sto) of Vec3, or of three columns for each marker.
+
+    Positions are in metres, converted from the unit in the header of the table.
 
     Raises:
         MissingFileError: the file does not exist.
@@ -165,7 +171,7 @@ def read_sto_markers(path: str | Path) -> MarkerData:
 
 
 def read_c3d(path: str | Path) -> MarkerData:
-    """Read the markers of a .c3d file, along the axes of the file.
+    """Return the markers of a .c3d file, in metres along the axes of the file.
 
     Raises:
         MissingFileError: the file does not exist.

@@ -115,7 +115,7 @@ def holds_orientations(path: str | Path) -> bool:
 
 
 def read_orientations(path: str | Path) -> OrientationData:
-    """Read the orientations of a .sto file.
+    """Return the orientations in a .sto file of quaternions.
 
     A quaternion of zeros, or with NaN, is a sensor that was not measured.
 

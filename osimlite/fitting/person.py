@@ -223,7 +223,15 @@ def fit(
 def _read_trials(
     trials: Mapping[str, Markers] | Iterable[Markers], static: Markers | None
 ) -> dict[str, MarkerData]:
-    """Return the markers of all trials by name."""
+    """Return the markers of all trials by name.
+
+    Args:
+        trials: markers of the trials, by name or in order.
+        static: markers of the static trial; None without one.
+
+    Raises:
+        SettingError: there is no trial.
+    """
     if isinstance(trials, Mapping):
         result = {name: MarkerData.from_source(trial) for name, trial in trials.items()}
     else:
@@ -345,7 +353,7 @@ class _PersonFit:
         ]
 
     def _evaluate_estimate(self, sizes: Array, offsets: Array, starts: Array) -> _Estimate:
-        """Fit the poses for sizes and offsets, and compute the cost.
+        """Return sizes and offsets with the poses that fit best, and with their cost.
 
         Args:
             sizes: sizes of the segments (k,), see :class:`osimlite.fitting.segments.Segments`.

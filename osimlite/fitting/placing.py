@@ -35,10 +35,10 @@ class MarkerPlacement:
     moved: dict[str, float]  # distance by which each marker moved, m
 
     def describe_pose(self) -> Iterator[tuple[str, str]]:
-        """Yield messages about the pose, with OpenSim's limits for a static trial.
+        """Return messages about the pose, with OpenSim's limits for a static trial.
 
-        Yields:
-            Subject and text of each message, see :func:`describe_fit`.
+        Returns:
+            Iterator over the subject and the text of each message, see :func:`describe_fit`.
         """
         return describe_fit(self.pose, (0.01, 0.02), " for markers on bones")
 
@@ -65,8 +65,12 @@ def place_markers(
         end: end of the range, s.
         coordinates: table with values of coordinates, for tasks that read them from a file.
 
+    Returns:
+        Pose of the model, removed markers, and the distances by which markers moved.
+
     Raises:
-        SettingError: the range has no frames, or a task has an unknown name.
+        SettingError: the data have only one frame, the range has no frames, or a task has an
+            unknown name.
     """
     start = max(start, float(data.times[0]))
     end = min(end, float(data.times[-1]))

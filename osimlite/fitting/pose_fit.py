@@ -145,7 +145,7 @@ class PoseFit:
     def fit_frames(
         self, measured: Array, times: Sequence[float] | Array | None = None, q: Array | None = None
     ) -> FittedPoses:
-        """Fit frames, starting from the latest pose.
+        """Return the poses that fit the measurements of frames, starting from the latest pose.
 
         Args:
             measured: measurements (t, ...) of t frames: positions of the markers in ground, m,

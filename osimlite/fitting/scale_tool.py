@@ -181,7 +181,11 @@ def _sum_masses(model: Model) -> float:
 
 
 def _create_measurements(pairs: MeasurementPairs) -> list[Measurement]:
-    """Return OpenSim's objects for measurements."""
+    """Return OpenSim's objects for measurements.
+
+    Raises:
+        SettingError: a measurement has no axes for each body, or other axes than X, Y and Z.
+    """
     for name, (_, scaled_bodies) in pairs.items():
         if not isinstance(scaled_bodies, Mapping):
             raise SettingError(
@@ -210,7 +214,7 @@ def _create_measurements(pairs: MeasurementPairs) -> list[Measurement]:
 
 
 def compute_scaled_model(tool: ScaleTool, folder: Path) -> ScaledModel:
-    """Compute what a ScaleTool computes from the files of its setup; write nothing.
+    """Return the scaled model and the files that a ScaleTool computes; write nothing.
 
     Args:
         tool: setup of the tool.
@@ -255,7 +259,15 @@ def compute_scaled_model(tool: ScaleTool, folder: Path) -> ScaledModel:
 
 
 def _scale_by_setup(tool: ScaleTool, model: Model, folder: Path) -> ScaleFactors:
-    """Scale a model by the measurements and factors of a setup."""
+    """Scale a model by the measurements and factors of a setup.
+
+    Returns:
+        Scale factors of the bodies, and their origin.
+
+    Raises:
+        SettingError: measurements need a marker file that the setup does not name, or its
+            `scaling_order` has an unknown word.
+    """
     scaler = tool.model_scaler
     measuring = ScaleFactorFinder(model)
     # Later words overwrite earlier ones, so that their order matters.

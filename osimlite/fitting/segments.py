@@ -37,7 +37,7 @@ class Segments(NamedTuple):
     def group_bodies(
         cls, carriers: Mapping[str, str], marked: Collection[str], *, by_axis: bool, symmetric: bool
     ) -> Segments:
-        """Group the bodies of a model into segments.
+        """Return the segments into which the bodies of a model are grouped.
 
         A body without markers has the factors of the body with markers that it carries, as the
         talus those of the foot, or else of the body that carries it, as the patella, the toes and

@@ -174,7 +174,15 @@ def _find_single_frame(
 
 
 def _get_axis_direction(rotation: Array, axis: str) -> Array:
-    """Return the direction of an axis of a sensor (3,)."""
+    """Return the direction (3,) of an axis of a sensor.
+
+    Args:
+        rotation: rotation matrix (3, 3) of the sensor.
+        axis: name of the axis, such as x or -z.
+
+    Raises:
+        SettingError: the name of the axis does not end in x, y or z.
+    """
     axis_name = axis.lower()
     if axis_name[-1] not in AXES:
         raise SettingError(f"unknown axis '{axis}'; expected x, y, z, -x, -y or -z")
@@ -183,7 +191,11 @@ def _get_axis_direction(rotation: Array, axis: str) -> Array:
 
 
 def _find_forward_direction(model: Model, mechanism: Mechanism, rotations: Array) -> Array:
-    """Return the direction in which a model faces (3,): x of the first joint's body on ground."""
+    """Return the direction in which a model faces (3,): x of the first joint's body on ground.
+
+    Raises:
+        SettingError: no joint of the model has ground as its parent.
+    """
     tree = model.tree()
     for joint in model.joint_set.objects:
         end_bodies = [

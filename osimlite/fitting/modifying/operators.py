@@ -191,7 +191,11 @@ def _remove_muscle(model: Model, muscle: Muscle) -> None:
 
 @register_operation(p.ModOpAddReserves)
 def _add_reserves(model: Model, operator: p.ModOpAddReserves, folder: Path) -> None:
-    """Add reserve actuators for coordinates."""
+    """Add reserve actuators for coordinates.
+
+    Raises:
+        ModelError: the optimal force is not positive, or the bound is negative.
+    """
     if operator.optimal_force <= 0.0:
         raise ModelError(
             f"reserve actuators have an optimal_force of {operator.optimal_force:g}; set a "
@@ -262,7 +266,11 @@ def _find_base(model: Model, component: Any, socket: str) -> Any:
 def _replace_joints_with_welds(
     model: Model, operator: p.ModOpReplaceJointsWithWelds, folder: Path
 ) -> None:
-    """Replace joints by weld joints."""
+    """Replace joints by weld joints.
+
+    Raises:
+        ModelError: the model has no joint of a given path or name.
+    """
     for path in map(str, operator.joint_paths):
         tree = model.tree()
         joints = {tree.path_of(existing) or "": existing for existing in model.components(Joint)}
@@ -377,6 +385,7 @@ def apply_operators(
         folder: folder from which paths start.
 
     Raises:
+        UnsupportedError: osimlite does not support the class of an operator.
         OsimliteError: an operator cannot be applied, see :func:`process_model`.
     """
     for operator in operators:

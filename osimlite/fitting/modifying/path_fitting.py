@@ -63,6 +63,9 @@ def fit_paths(
         model: model with the paths; function-based paths are skipped.
         tolerance: root mean square error at which the order stops rising, m.
         poses: number of poses, spread over the ranges of the coordinates.
+
+    Returns:
+        Fits of all paths that are not function-based, in the order of the paths of the model.
     """
     model_paths = paths(model)
     mechanism = model_paths.mechanism
@@ -145,7 +148,12 @@ def _fit_path(
     arms: Array,
     tolerance: float,
 ) -> PathFit:
-    """Fit the polynomial of one path."""
+    """Fit the polynomial of one path.
+
+    Returns:
+        Fit of the lowest order whose root mean square errors are within `tolerance`, or else of the
+        highest order that the poses determine.
+    """
     varied_coordinates = [
         k for k in free_coordinates if np.nanmax(np.abs(arms[:, k])) > MIN_MOMENT_ARM_M
     ] or free_coordinates[:1]

@@ -29,7 +29,11 @@ def _create_change(operator: Any) -> Change:
 
 
 def _replace_paths_with_polynomials(model: Model, folder: Path) -> list[PathFit]:
-    """Replace all paths by polynomials."""
+    """Replace all paths by polynomials.
+
+    Returns:
+        Fit of each path, with its errors.
+    """
     fits = fit_paths(model)
     replace_paths(model, [fit.path for fit in fits])
     return fits
@@ -60,7 +64,11 @@ CHANGES_BY_WORD: dict[str, dict[str, Callable[[], Change]]] = {
 
 
 def _parse_welds(value: str) -> Any:
-    """Return the operator for ``weld:NAME,NAME``."""
+    """Return the operator for ``weld:NAME,NAME``.
+
+    Raises:
+        SettingError: the value does not have this form.
+    """
     replacement, _, names = value.partition(":")
     if replacement != "weld" or not names:
         raise SettingError(
