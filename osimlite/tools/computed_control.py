@@ -239,13 +239,18 @@ class ComputedControl:
     def follow_motion(
         self, start: float, y: list[float], end: float, settings: EngineSettings
     ) -> TrackedMotion:
-        """Follow the motion from a state to a time.
+        """Return the motion from a state to a time, computed window by window.
+
+        If the motion cannot be continued, the result ends early and names the reason in `failure`.
 
         Args:
             start: initial time, s.
             y: initial state, which may violate the constraints.
             end: final time, s.
             settings: tolerance and step sizes of the integrator.
+
+        Raises:
+            KeyboardInterrupt: the user stops the integration.
         """
         result = TrackedMotion()
         if not self.has_states:

@@ -234,7 +234,7 @@ class StateRows(NamedTuple):
 
     @classmethod
     def read(cls, job: Job, path: Path, simulation: Simulation) -> StateRows:
-        """Read states of the model of a simulation.
+        """Return the states in a file that are states of the model of a simulation.
 
         Args:
             job: setup of the tool, with the paths of its files.

@@ -83,7 +83,7 @@ class Job:
         raise self.create_error(f"the setup names no {' or '.join(tags)}; add one")
 
     def read_model(self) -> Model:
-        """Read the model that the setup names, without the cache.
+        """Return the model that the setup names, read without the cache.
 
         Raises:
             DocumentError: the setup names no model, or osimlite cannot read it.

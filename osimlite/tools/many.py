@@ -249,7 +249,11 @@ def _run_one(
     write_outside: bool,
     setup: Path,
 ) -> RunRecord:
-    """Run one setup; its errors become part of the record."""
+    """Run one setup; its errors become part of the record.
+
+    Returns:
+        Record of the run: done, without a solution, or failed with the reason.
+    """
     started = time.perf_counter()
     try:
         digest = compute_digest(setup)
@@ -492,10 +496,13 @@ def _is_prefixed_result(path: str, prefixed: tuple[str, re.Pattern[str]] | None)
 
 
 def _find_needs(setups: Sequence[Path]) -> dict[Path, list[Path]]:
-    """Return, for each setup, the other setups that write its inputs.
+    """Return the setups that write the inputs of each setup.
 
     Setups that need each other are run in the given order. Setups of unsupported tools count as
     finished: another program may have run them.
+
+    Returns:
+        Setups that must run first, by setup; empty without any.
     """
     writers: dict[str, Path] = {}
     tools = list_runnable()

@@ -49,7 +49,7 @@ MuscleTables = dict[str, Array]
 
 
 def compute_quantities(records: Mapping[str, Array], muscles: Sequence[Any]) -> MuscleTables:
-    """Compute the tables of some muscles of one class.
+    """Return the tables of some muscles of one class.
 
     The formulas are those of OpenSim's base class; `CORRECTIONS` has those of other classes.
 
@@ -98,26 +98,26 @@ def compute_quantities(records: Mapping[str, Array], muscles: Sequence[Any]) -> 
 
 
 def _correct_thelen(tables: MuscleTables, muscles: Sequence[Any]) -> MuscleTables:
-    """Correct Thelen2003Muscle: fibers at rest at their minimum length have no force.
+    """Return the fiber force of Thelen2003Muscle: zero for a fiber at rest at its minimum length.
 
-    That holds although there is a passive force.
+    OpenSim reports no fiber force there, although the fiber has a passive force.
     """
     is_at_rest = (tables["FiberVelocity"] == 0.0) & (tables["ActiveFiberForce"] == 0.0)
     return {"FiberForce": np.where(is_at_rest, 0.0, tables["FiberForce"])}
 
 
 def _correct_millard(tables: MuscleTables, muscles: Sequence[Any]) -> MuscleTables:
-    """Correct Millard2012EquilibriumMuscle: a rigid tendon has no power."""
+    """Return the tendon power of Millard2012EquilibriumMuscle: zero for a rigid tendon."""
     return _correct_tendon_power(tables, [muscle.ignore_tendon_compliance for muscle in muscles])
 
 
 def _correct_tendon_power(tables: MuscleTables, is_rigid: Sequence[bool]) -> MuscleTables:
-    """Set the tendon power of muscles with a rigid tendon to zero."""
+    """Return the tendon power, which is zero for muscles with a rigid tendon."""
     return {"TendonPower": np.where(is_rigid, 0.0, tables["TendonPower"])}
 
 
 def _correct_acceleration_muscle(tables: MuscleTables, muscles: Sequence[Any]) -> MuscleTables:
-    """Correct Millard2012AccelerationMuscle.
+    """Return the corrected fiber force and passive power of Millard2012AccelerationMuscle.
 
     The fiber force includes the damping. The passive power includes the power of the mass at the
     end of the fibers.
@@ -135,9 +135,10 @@ def _correct_acceleration_muscle(tables: MuscleTables, muscles: Sequence[Any]) -
 
 
 def _correct_degroote(tables: MuscleTables, muscles: Sequence[Any]) -> MuscleTables:
-    """Correct DeGrooteFregly2016Muscle: pennation angles beyond 90° count as their supplement.
+    """Return the pennation angle and tendon power as DeGrooteFregly2016Muscle computes them.
 
-    The angular velocity has the sign of the uncorrected angle.
+    A pennation angle beyond 90° counts as its supplement. Its angular velocity has the sign of the
+    uncorrected angle. The power of a rigid tendon is zero.
     """
     angle = np.minimum(tables["PennationAngle"], np.pi - tables["PennationAngle"])
     modes = [getattr(muscle, "tendon_compliance_dynamics_mode", "implicit") for muscle in muscles]
@@ -149,7 +150,11 @@ def _correct_degroote(tables: MuscleTables, muscles: Sequence[Any]) -> MuscleTab
 
 
 def _correct_rigid_tendon(tables: MuscleTables, muscles: Sequence[Any]) -> MuscleTables:
-    """Correct RigidTendonMuscle: the tendon has its slack length, even if the path is shorter."""
+    """Return the quantities of the tendon as RigidTendonMuscle computes them.
+
+    The tendon has its slack length, even if the path is shorter, and no power. The angular velocity
+    of the pennation is NaN.
+    """
     slack = np.array([muscle.tendon_slack_length for muscle in muscles])
     zeros = np.zeros_like(tables["Length"])
     return {
@@ -160,7 +165,7 @@ def _correct_rigid_tendon(tables: MuscleTables, muscles: Sequence[Any]) -> Muscl
 
 
 def _correct_deprecated(tables: MuscleTables, muscles: Sequence[Any]) -> MuscleTables:
-    """Correct deprecated classes: OpenSim does not compute these quantities."""
+    """Return NaN for the quantities that OpenSim does not compute for deprecated classes."""
     names = (
         "FiberForce",
         "PennationAngularVelocity",

@@ -164,6 +164,9 @@ class Outcome:
         """Raise an error for a motion with NaN, or a table with infinite numbers.
 
         NaN is allowed in other tables, for unseen markers and for some muscles.
+
+        Raises:
+            SimulationError: a number is infinite, or is NaN where NaN is not allowed.
         """
         motion = self.evidence
         if motion is not None and not np.isfinite(motion.values).all():
@@ -182,7 +185,11 @@ class Outcome:
                 )
 
     def _protect_inputs(self, setup: Path) -> None:
-        """Raise an error if a result would replace an input; a model may replace its source."""
+        """Raise an error if a result would replace an input; a model may replace its source.
+
+        Raises:
+            DocumentError: a result would replace an input of the setup.
+        """
         protected_paths = [
             path
             for path in self._texts

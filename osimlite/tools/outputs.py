@@ -266,7 +266,11 @@ def _create_reaction_reader(side: str) -> Reader:
 
 
 def _read_joint_power(motion: Motion, joint: Joint, path: str) -> Array:
-    """Return the power of a joint, which is zero without prescribed coordinates."""
+    """Return the power of a joint, which is zero without prescribed coordinates.
+
+    Raises:
+        UnsupportedError: a coordinate of the joint is prescribed.
+    """
     tree = motion.model.tree()
     if any(
         info.prescribed is not None and info.path.startswith(f"{path}/")

@@ -85,7 +85,11 @@ class _FileSearch:
                     queue.append(os.path.join(folder, entry.name))
 
     def _list_entries(self, folder: str) -> list[os.DirEntry[str]]:
-        """Return the sorted entries of a folder; none if it cannot be read."""
+        """Return the sorted entries of a folder; none if it cannot be read.
+
+        Raises:
+            OsimliteError: the search has visited more than `MAX_ENTRIES` files.
+        """
         try:
             with os.scandir(folder or ".") as entries:
                 result = sorted(entries, key=lambda entry: entry.name)

@@ -39,7 +39,7 @@ ANALYSES: dict[str, str] = {
 
 
 def import_function(path: str) -> Callable[..., Any]:
-    """Import a function.
+    """Return a function, and import its module if necessary.
 
     Args:
         path: module and name of the function, joined by a dot, as in :data:`TOOLS`.

@@ -111,7 +111,8 @@ def run(
 
     Raises:
         FaultySetup: the check found errors.
-        UnsupportedError: osimlite has no tool for the class of the document.
+        NotRunnable: osimlite has no tool for the class of the document.
+        SettingError: `refine` is given, but the tool has no mesh.
         OsimliteError: the tool failed; then it has written nothing.
     """
     if not isinstance(setup, str | os.PathLike):

@@ -67,7 +67,7 @@ class DesiredMotion:
     def read(
         cls, job: Job, outcome: Outcome, simulation: Simulation, model: Model
     ) -> DesiredMotion:
-        """Read, pad and filter the motion that a setup names.
+        """Return the motion that a setup names, padded and filtered.
 
         Args:
             job: setup of the tool, with the paths of its files.
@@ -201,7 +201,7 @@ class TrackingTasks:
 
     @classmethod
     def read(cls, job: Job, mechanism: Mechanism) -> TrackingTasks:
-        """Read the tasks of a setup.
+        """Return the tasks of a setup.
 
         Args:
             job: setup of the tool, with the paths of its files.
@@ -209,7 +209,7 @@ class TrackingTasks:
 
         Raises:
             NotRunnable: a task is of another class than CMC_Joint.
-            DocumentError: no task is active, or one names no coordinate.
+            DocumentError: no task is active, or one names no coordinate or lacks a property.
         """
         path = job.require_path("task_set_file")
         result = []
@@ -277,7 +277,7 @@ class TrackingTasks:
         ]
 
     def compute_accelerations(self, errors: tuple[Array, Array], desired: Array) -> Array:
-        """Compute the accelerations (k,) that correct errors: ka u̇ + kv ėrr + kp err.
+        """Return the accelerations (k,) that correct errors: ka u̇ + kv ėrr + kp err.
 
         Args:
             errors: errors of values and speeds.

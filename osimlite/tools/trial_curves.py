@@ -78,7 +78,7 @@ class TrialCurve(NamedTuple):
 
 
 def collect_trials(outcomes: Mapping[str | Path, Outcome]) -> list[TrialOutcomes]:
-    """Group outcomes by the folders of their setups."""
+    """Return the outcomes, grouped by the folders of their setups."""
     by_folder: dict[Path, dict[Path, Outcome]] = {}
     for setup, outcome in outcomes.items():
         by_folder.setdefault(Path(setup).resolve().parent, {})[Path(setup)] = outcome

@@ -154,6 +154,9 @@ def measure_inverse_dynamics(tool: TrialTool, *, is_final: bool) -> Numbers:
     Args:
         tool: setup of the class InverseDynamicsTool.
         is_final: whether no later tool reduces these residuals.
+
+    Raises:
+        MissingInput: the table of forces does not exist.
     """
     file = tool.find_result(tool.setup.output_gen_force_file)
     if file is None:
@@ -182,6 +185,10 @@ def measure_reserves(
         file: table of actuator forces.
         actuators: roles of the actuators.
         tools: setups of all tools of the trial.
+
+    Raises:
+        MissingInput: the tool has no muscles, or no reserve actuators of coordinates that a muscle
+            crosses.
     """
     table = tool.folder.read_table(file)
     columns = {

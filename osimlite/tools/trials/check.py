@@ -355,7 +355,11 @@ def _plan_static_optimization(
 
 
 def _measure_residuals(tool: TrialTool, file: Path) -> Numbers:
-    """Yield the residuals of a tool."""
+    """Return an iterator over the residuals of a tool.
+
+    Raises:
+        MissingInput: the table has no residual actuators.
+    """
     units = find_actuators(tool).residuals
     if not any(column in units for column in tool.folder.read_table(file).columns):
         raise MissingInput(f"{tool} has no residual actuators")
@@ -363,12 +367,12 @@ def _measure_residuals(tool: TrialTool, file: Path) -> Numbers:
 
 
 def _measure_reserves(tool: TrialTool, file: Path, tools: Sequence[TrialTool]) -> Numbers:
-    """Yield the reserves of a tool."""
+    """Return an iterator over the reserves of a tool."""
     return measure_reserves(tool, file, find_actuators(tool), tools)
 
 
 def _measure_activations(tool: TrialTool, file: Path) -> Numbers:
-    """Yield the activations of a tool."""
+    """Return an iterator over the activations of a tool."""
     return measure_activations(tool.folder, file, find_actuators(tool).muscles)
 
 

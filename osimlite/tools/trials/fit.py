@@ -43,7 +43,12 @@ Numbers = Iterator[tuple[Path, Measurement]]
 
 
 def measure_scale_errors(tool: TrialTool) -> Numbers:
-    """Yield marker errors of a scaled model in its static pose, before the markers are moved."""
+    """Yield marker errors of a scaled model in its static pose, before the markers are moved.
+
+    Raises:
+        MissingInput: the tool places no markers, or none of the markers with large weights was
+            measured.
+    """
     placer = tool.setup.marker_placer
     if not placer.apply:
         raise MissingInput(f"{tool} places no markers")
@@ -83,7 +88,15 @@ def measure_scale_errors(tool: TrialTool) -> Numbers:
 
 
 def measure_marker_errors(tool: TrialTool) -> Numbers:
-    """Yield marker errors of inverse kinematics, and pairs of swapped markers."""
+    """Return an iterator over marker errors of inverse kinematics and swapped markers.
+
+    Yields:
+        File, and the number that was measured from it.
+
+    Raises:
+        MissingInput: the motion does not exist, or neither the markers nor a file of marker errors
+            can be read.
+    """
     setup, folder = tool.setup, tool.folder
     name = setup.output_motion_file.strip()
     file = None if name in NO_FILE else folder.find_file(tool.job.get_output_path(name))
@@ -192,6 +205,9 @@ def _read_fitted_motion(tool: TrialTool, file: Path) -> FittedMotion:
     Args:
         tool: setup of the class InverseKinematicsTool.
         file: table of its motion.
+
+    Raises:
+        MissingInput: the motion and the markers have no times in common.
     """
     model, mechanism = tool.model, tool.mechanism
     recorded = tool.folder.read_motion(file, tool.model_file)

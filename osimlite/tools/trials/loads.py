@@ -224,7 +224,12 @@ def _measure_distances(
 
 
 def measure_weight(tool: TrialTool) -> Numbers:
-    """Yield the difference of the model's mass from the mass that the plates carry."""
+    """Yield the difference of the model's mass from the mass that the plates carry.
+
+    Raises:
+        MissingInput: there are no loads or no mass, a load is not expressed in ground, or no foot
+            stands on a plate for long enough.
+    """
     _, table, loads = read_loads(tool)
     motion = tool.motion
     up = _find_up(tool)

@@ -71,12 +71,16 @@ def measure_passive_forces(tool: TrialTool, states: Path | None) -> Numbers:
 
 
 def compute_passive_forces(tool: TrialTool, file: Path, *, is_states: bool) -> StoTable:
-    """Compute the forces (N) of the passive fibers of all muscles at some times.
+    """Return the forces (N) of the passive fibers of all muscles at some times.
 
     Args:
         tool: tool with the model.
         file: file of states or of a motion.
         is_states: whether the file has states.
+
+    Raises:
+        MissingInput: the model has no muscles, or the file has no row in the time range of the
+            tool.
     """
     times = tool.folder.read_table(file).times
     start = max(float(times[0]), tool.span[0])
