@@ -253,6 +253,9 @@ def read_bvh(path: str | Path) -> BvhMotion:
     Args:
         path: path of the BVH file.
 
+    Returns:
+        Joints of the skeleton, and the values of their channels in each frame.
+
     Raises:
         MissingFileError: the file does not exist or cannot be read.
         DocumentError: it is not a BVH file, or is damaged; the message names the line.
@@ -319,7 +322,11 @@ def _read_joints(reader: _BvhReader, joints: list[BvhJoint]) -> None:
 
 
 def _take_end_site(reader: _BvhReader) -> Array:
-    """Read an end site, and return its position in the joint (3,)."""
+    """Read an end site.
+
+    Returns:
+        Position of the end site in the frame of its joint (3,), in the length unit of the file.
+    """
     reader.take()
     reader.take_name()
     reader.take("{")
@@ -330,7 +337,7 @@ def _take_end_site(reader: _BvhReader) -> Array:
 
 
 def _take_channel_count(reader: _BvhReader) -> int:
-    """Read the number of channels; a joint without the keyword has none."""
+    """Return the number of channels of a joint and advance; 0 for a joint without the keyword."""
     if reader.peek().upper() != "CHANNELS":
         return 0
     reader.take()
@@ -341,7 +348,7 @@ def _take_channel_count(reader: _BvhReader) -> int:
 
 
 def _take_channel(reader: _BvhReader) -> str:
-    """Read the name of a channel."""
+    """Return the next word as the name of a channel and advance."""
     word = reader.peek()
     channels = {name.lower(): name for name in (*POSITIONS, *ROTATIONS)}
     if word.lower() not in channels:

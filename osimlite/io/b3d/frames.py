@@ -93,7 +93,11 @@ def _replace_row(
     layout: Layout,
     names: Mapping[int, str],
 ) -> None:
-    """Decode a frame whose fields are in other places than those of the first frame."""
+    """Decode a frame whose fields are in other places than those of the first frame.
+
+    Raises:
+        DamagedMessageError: the row is not a message, or has other fields than the first frame.
+    """
     text = row.tobytes()
     row_layout = _find_layout(memoryview(text))
     if {number: size for number, (_, size) in row_layout.items()} != {

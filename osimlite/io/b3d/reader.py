@@ -36,6 +36,9 @@ def read_b3d(path: str | Path) -> B3dSubject:
     Args:
         path: path of the .b3d file.
 
+    Returns:
+        Subject with its header and trials.
+
     Raises:
         MissingFileError: the file does not exist or cannot be read.
         DocumentError: the file is damaged, or has another version than 4.
@@ -84,7 +87,11 @@ def read_b3d(path: str | Path) -> B3dSubject:
 
 
 def _expect_version(data: memoryview, file: str) -> None:
-    """Raise an error unless a header has the field numbers of version 4."""
+    """Raise an error unless a header has the field numbers of version 4.
+
+    Raises:
+        DocumentError: the header has no version, another version, or fields of different versions.
+    """
     versions = []
     has_other_numbers = False
     for message_field in split_message(data):
@@ -125,7 +132,12 @@ def _expect_version(data: memoryview, file: str) -> None:
 
 
 def _expect_plausible(header: Mapping[str, Any], file: str) -> None:
-    """Raise an error if numbers of a header cannot be right."""
+    """Raise an error if numbers of a header cannot be right.
+
+    Raises:
+        DocumentError: a count or size is negative, a time step is not positive and finite, custom
+            values have wrong sizes, or a trial has more processing passes than the file.
+    """
     problems = []
     counts = ("dof_count", "sensor_frame_size", "pass_frame_size", "emg_samples")
     problems += [f"'{name}' is {header[name]}" for name in counts if header[name] < 0]

@@ -447,7 +447,12 @@ class B3dSubject:
         return self._read_shared_model(processing_pass).copy_deep()
 
     def _read_shared_model(self, processing_pass: int) -> Model:
-        """Return the model of a processing pass; callers share it and must not change it."""
+        """Return the model of a processing pass; callers share it and must not change it.
+
+        Raises:
+            SettingError: the file has no processing pass with this index.
+            DocumentError: the text of the model cannot be read.
+        """
         count = len(self.model_texts)
         # Negative indices count from the last pass, as for lists.
         index = processing_pass + count if processing_pass < 0 else processing_pass
@@ -522,7 +527,11 @@ class B3dSubject:
 
 
 def read_at(stream: BinaryIO, offset: int, size: int, path: Path) -> bytes:
-    """Return bytes of a file from an offset on."""
+    """Return bytes of a file from an offset on.
+
+    Raises:
+        DocumentError: the file cannot be read, or ends before the last of the bytes.
+    """
     try:
         # The position may be beyond what the system allows.
         stream.seek(offset)

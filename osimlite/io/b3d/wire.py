@@ -87,7 +87,12 @@ def split_message(data: memoryview) -> Iterator[WireField]:
 
 
 def _read_varint(data: memoryview, position: int) -> tuple[int, int]:
-    """Return a varint and the position after it."""
+    """Return a varint and the position after it.
+
+    Raises:
+        DamagedMessageError: the message ends within the number, or the number has more than 64
+            bits.
+    """
     result = 0
     for index in range(MAX_VARINT_BYTES):
         if position + index >= len(data):
@@ -167,7 +172,12 @@ def decode_message(data: memoryview, schema: Schema) -> dict[str, Any]:
 
 
 def _decode_values(field: WireField, declared: Field) -> list[Any]:
-    """Return the values of a field; numbers may be packed, several in one field."""
+    """Return the values of a field; numbers may be packed, several in one field.
+
+    Raises:
+        DamagedMessageError: the field has another wire type than its declared type, a number is cut
+            off, or a text is not UTF-8.
+    """
     kind, value = declared.type, field.value
     if kind in ("int", "bool"):
         if isinstance(value, int):
@@ -202,7 +212,10 @@ def _decode_values(field: WireField, declared: Field) -> list[Any]:
 
 
 def _convert_integer(value: int, kind: str | Schema) -> int | bool:
-    """Convert a varint to a truth value or a signed integer of 32 bits; negative ones have 64 bits in the file."""
+    """Return a varint as a truth value or as a signed integer of 32 bits.
+
+    A negative integer has 64 bits in the file.
+    """
     if kind == "bool":
         return bool(value)
     # Two's complement of 32 bits.

@@ -49,7 +49,12 @@ def read_obj_polygons(content: bytes, name: str) -> Polygons:
 
 
 def _parse_lines(content: bytes, name: str) -> tuple[Polygons, Array | None, Indices]:
-    """Return polygons, normals (m, 3) or None, and the index of the normal of each corner."""
+    """Return polygons, normals (m, 3) or None, and the index of the normal of each corner.
+
+    Raises:
+        OsimliteError: a point or a face is damaged, there are no faces, a face refers to a missing
+            point, or a number is not finite.
+    """
     points: list[tuple[float, float, float]] = []
     normals: list[list[str]] = []
     corners: list[int] = []

@@ -73,7 +73,11 @@ def _read_binary(content: bytes, name: str) -> _Triangles | None:
 
 
 def _read_text_corners(content: bytes, name: str) -> Array:
-    """Return the corners (t, 3, 3) of the triangles of a text STL file."""
+    """Return the corners (t, 3, 3) of the triangles of a text STL file.
+
+    Raises:
+        OsimliteError: the file is not a text STL file, or its triangles are damaged or cut off.
+    """
     if content.lstrip()[:5].lower() != b"solid":
         raise OsimliteError("it is not an STL file, or is cut off; save the mesh again", file=name)
     numbers = np.array(_CORNER.findall(content + b"\n"), dtype="S").astype(np.float64)

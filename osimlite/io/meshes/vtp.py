@@ -34,7 +34,11 @@ MAX_BYTES = 400_000_000
 
 
 def _decompress_zlib(block: bytes, size: int) -> bytes:
-    """Decompress a block of zlib to at most `size` bytes; raise ValueError for more."""
+    """Return the content of a block that zlib has compressed.
+
+    Raises:
+        ValueError: the block is cut off, or its content is longer than `size` bytes.
+    """
     stream = zlib.decompressobj()
     # One byte more than allowed shows that there is more.
     data = stream.decompress(block, size + 1)
@@ -44,7 +48,11 @@ def _decompress_zlib(block: bytes, size: int) -> bytes:
 
 
 def _decompress_lzma(block: bytes, size: int) -> bytes:
-    """Decompress a block of LZMA to at most `size` bytes; raise ValueError for more."""
+    """Return the content of a block that LZMA has compressed.
+
+    Raises:
+        ValueError: the block is cut off, or its content is longer than `size` bytes.
+    """
     stream = lzma.LZMADecompressor(memlimit=MAX_BYTES)
     data = stream.decompress(block, size + 1)
     if len(data) > size or not stream.eof:
@@ -76,6 +84,9 @@ def read_vtp(content: bytes, name: str) -> Surface:
         content: content of the file.
         name: name of the file, for messages.
 
+    Returns:
+        Triangles of the surface, with normals if the file has them for all points.
+
     Raises:
         OsimliteError: the file is not such a file, is damaged, or has an unsupported compression.
     """
@@ -92,6 +103,9 @@ def read_vtp_polygons(content: bytes, name: str) -> Polygons:
         content: content of the file.
         name: name of the file, for messages.
 
+    Returns:
+        Polygons of the file, including those of strips.
+
     Raises:
         OsimliteError: the file is not such a file, is damaged, or has an unsupported compression.
     """
@@ -101,7 +115,12 @@ def read_vtp_polygons(content: bytes, name: str) -> Polygons:
 
 @contextmanager
 def _name_errors(name: str) -> Iterator[None]:
-    """Raise errors of a file with its name."""
+    """Raise errors of a file with its name.
+
+    Raises:
+        OsimliteError: the reader finds in the body of the `with` statement that it cannot read the
+            file.
+    """
     try:
         # Invalid numbers of a damaged file are found in the result, so numpy need not warn of
         # them.
@@ -166,6 +185,9 @@ class _File:
 
         Returns:
             The polygons, and the normals at the points (n, 3); None if a piece has none.
+
+        Raises:
+            _Unreadable: the file has no polygons.
         """
         points = [np.zeros((0, 3))]
         corners = [np.zeros(0, dtype=np.int64)]
@@ -205,7 +227,12 @@ class _File:
                 yield triangles.ravel(), np.full(len(triangles), 3)
 
     def _read_cells(self, piece: etree._Element, tag: str, count: int) -> tuple[Indices, Indices]:
-        """Return the corners of all cells of a kind, one after the other, and the end of each cell."""
+        """Return the corners of all cells of a kind, one after the other, and the end of each cell.
+
+        Raises:
+            _Unreadable: the offsets do not fit the connectivity, or a corner is not one of the
+                points.
+        """
         corners, ends = (
             np.zeros(0, dtype=np.int64)
             if array is None
@@ -256,7 +283,12 @@ class _File:
         return numbers.reshape(-1, 3)
 
     def _read_numbers(self, array: etree._Element) -> NDArray[np.generic]:
-        """Return the numbers of a DataArray."""
+        """Return the numbers of a DataArray.
+
+        Raises:
+            _Unreadable: the type or format of the numbers is unknown, or they are damaged, cut off,
+                or need too much memory.
+        """
         kind, form = array.get("type", ""), array.get("format", "ascii")
         if kind not in _TYPES:
             raise _Unreadable(f"it has numbers of the type '{kind}'")
@@ -287,7 +319,11 @@ class _File:
             ) from None
 
     def _get_appended_array(self, offset: int) -> bytes:
-        """Return the bytes of the array that starts at an offset of the appended data."""
+        """Return the bytes of the array that starts at an offset of the appended data.
+
+        Raises:
+            ValueError: the offset is outside of the appended data.
+        """
         if not 0 <= offset < len(self.appended):
             raise ValueError
         end = next(next_offset for next_offset in self.offsets if next_offset > offset)
@@ -295,7 +331,13 @@ class _File:
         return encoded if self.raw else _decode_base64(encoded)
 
     def _count_bytes(self, count: float) -> None:
-        """Add bytes to the sum of numbers read, which is limited: several arrays may use the same bytes."""
+        """Add bytes to the sum of numbers read, which is limited.
+
+        Several arrays may use the same bytes, so that the size of the file is no limit.
+
+        Raises:
+            _Unreadable: the sum is larger than `MAX_BYTES`.
+        """
         self.left -= count
         if self.left < 0:
             raise _Unreadable(f"it has more than {MAX_BYTES / 1e6:g} MB of numbers")
@@ -306,6 +348,11 @@ class _File:
         Args:
             stream: bytes of the header and the block.
             weight: bytes in memory for each byte of the content.
+
+        Raises:
+            ValueError: the block does not have the size that its header declares.
+            _Unreadable: the compression is unknown, or the content is larger than `MAX_BYTES`
+                allows.
         """
         width = self.header.itemsize
         if not self.compressor:
@@ -344,7 +391,7 @@ class _File:
 
 
 def _decode_base64(text: bytes) -> bytes:
-    """Decode base64 text, in which header and data may be encoded and padded separately."""
+    """Return the bytes of base64 text, in which header and data may be encoded separately."""
     # "=" ends a part.
     parts = re.findall(rb"[^=]+=*", b"".join(text.split()))
     return b"".join(base64.b64decode(part, validate=True) for part in parts)

@@ -57,8 +57,11 @@ def read_c3d_markers(path: str | Path) -> tuple[tuple[str, ...], Array, Array]:
 def read_c3d_forces(path: str | Path) -> StoTable:
     """Read the forces of the force plates over time, with the labels of OpenSim's reader.
 
-    Columns of the first plate are ``f1_x``, ``f1_y``, ``f1_z`` for the force (N), ``p1_x`` ... for the
-    centre of the plate (m), and ``m1_x`` ... for the moment about it (N·m).
+    Columns of the first plate are ``f1_x``, ``f1_y``, ``f1_z`` for the force (N), ``p1_x`` ... for
+    the centre of the plate (m), and ``m1_x`` ... for the moment about it (N·m).
+
+    Returns:
+        Table with the times of the frames (s) and the columns of all plates.
 
     Raises:
         MissingFileError: the file does not exist.
@@ -76,12 +79,20 @@ def read_c3d_forces(path: str | Path) -> StoTable:
 def _run_reader(path: str | Path, content_type: str) -> dict[str, Array]:
     """Run the reader in a separate process.
 
-    Damaged files make ezc3d 1.6 write outside its memory (the process ends by SIGSEGV) or loop forever;
-    in a separate process nothing else is lost, and the time is limited.
+    Damaged files make ezc3d 1.6 write outside its memory (the process ends by SIGSEGV) or loop
+    forever. In a separate process nothing else is lost, and the time is limited.
 
     Args:
         path: path of the .c3d file.
         content_type: ``markers`` or ``forces``.
+
+    Returns:
+        Arrays by name, as `read_markers` or `read_forces` of `c3d_process` returns them.
+
+    Raises:
+        MissingFileError: the file does not exist.
+        MissingDependency: ezc3d is not installed.
+        DocumentError: the reader rejects the file, crashes, does not finish, or cannot be started.
     """
     size = len(read_file(path))
     # An entry None in sys.modules blocks the import, as a missing package does.

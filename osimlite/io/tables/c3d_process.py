@@ -22,9 +22,12 @@ MAX_BYTES = 4_000_000_000
 
 
 def run_process() -> None:
-    """Read the file that the command names, and write its markers or its forces to the standard output.
+    """Read the file that the command names, and write its markers or forces to standard output.
 
     Of a file that cannot be read the reason is written as JSON, and the exit code is 1.
+
+    Raises:
+        SystemExit: the file cannot be read; with exit code 1.
     """
     content_type, path, seconds = sys.argv[1:4]
     _limit_resources(int(seconds))
@@ -59,7 +62,11 @@ def read_markers(path: str) -> dict[str, Array]:
     """Read the markers of a .c3d file.
 
     Returns:
-        "names" (m,), "times" (t,) in s and "positions" (t, m, 3) in m, NaN where a marker was not seen.
+        "names" (m,), "times" (t,) in s and "positions" (t, m, 3) in m, NaN where a marker was not
+        seen.
+
+    Raises:
+        ValueError: the file has fewer labels than markers.
     """
     result = import_module("ezc3d").c3d(path)
     points = result["parameters"]["POINT"]

@@ -54,7 +54,11 @@ class StoTable(Tabular):
         return f"{words}, {format_count(len(self.columns), 'column')}"
 
     def __getitem__(self, column: str) -> Array:
-        """Return the first column (n,) with a label; raise KeyError if there is none."""
+        """Return the first column (n,) with a label.
+
+        Raises:
+            KeyError: no column has this label.
+        """
         if column not in self.columns:
             raise KeyError(column)
         return self.rows[:, self.columns.index(column)]
@@ -148,7 +152,11 @@ def write_sto(
 
 
 def read_sto(path: str | Path) -> StoTable:
-    """Read a table that OpenSim 4 or an older version wrote; for errors see :class:`TableStream`."""
+    """Read a table that OpenSim 4 or an older version wrote; for errors see :class:`TableStream`.
+
+    Returns:
+        Table with the labels and all rows of the file.
+    """
     times, rows = array("d"), array("d")
     with TableStream(path) as stream:
         for time, row in stream:
@@ -270,7 +278,12 @@ def _format_header(
 def _format_lines(
     times: Iterable[float], rows: Iterable[Iterable[float]], size: int, columns: Sequence[str] = ()
 ) -> Iterator[str]:
-    """Yield lines of numbers, `size` per value; numbers of named columns must be finite."""
+    """Yield lines of numbers, `size` per value; numbers of named columns must be finite.
+
+    Raises:
+        SimulationError: a number of a named column is NaN or infinite.
+        OsimliteError: the numbers of a row cannot be divided into values of `size` numbers.
+    """
     for time, row in zip(times, rows, strict=True):
         # Rows are checked one by one, since they may come from a generator.
         if columns and not np.isfinite(values := np.array([*row], dtype=float)).all():

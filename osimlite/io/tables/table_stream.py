@@ -134,6 +134,9 @@ class TableStream:
             cells: cells after the time.
             number: number of the line.
             column: column of the first cell in the line, from 1.
+
+        Raises:
+            DocumentError: a cell does not have as many numbers as a value of the table.
         """
         row = []
         size = self._size
@@ -156,7 +159,11 @@ class TableStream:
         return row
 
     def _parse_special_row(self, text: str, number: int) -> list[float]:
-        """Return the numbers of a row that has other words than plain numbers."""
+        """Return the numbers of a row that has other words than plain numbers.
+
+        Raises:
+            DocumentError: a word is not a number.
+        """
         row = []
         for match in re.finditer(r"\S+", text):
             word = match.group()
@@ -180,7 +187,12 @@ class TableStream:
         return row
 
     def _read_header(self) -> None:
-        """Read the header, the labels, and the column of the time."""
+        """Read the header, the labels, and the column of the time.
+
+        Raises:
+            DocumentError: the file is not a table, ends before its labels, or has no column 'time',
+                or has vectors and another first column.
+        """
         beginning = b"".join(self._stream.readlines(MAX_HEADER_BYTES))
         result = StorageHeader(beginning, self.file)
         if not result.end.text:
@@ -238,7 +250,9 @@ def find_word_start(text: str, word: int) -> int:
 
 
 def stream_table(path: str | Path) -> TableStream:
-    """Open a storage file to read it row by row; errors are those of :class:`TableStream`.
+    """Return a storage file that is open for reading row by row.
+
+    Errors are those of :class:`TableStream`.
 
     Example::
 
