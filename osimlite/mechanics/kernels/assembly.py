@@ -109,6 +109,9 @@ def assemble_poses(
         solutions: filled with the values that fulfil the constraints, then a `POSE_STATUS`, of each
             pose (count, n + 1).
         count: number of poses.
+
+    Returns:
+        `OUTCOME.OK`, also if some poses cannot be assembled: `solutions` has the status of each.
     """
     a = Assembly(model, reals, data, y, f, p, c, w)
     size = model[MODEL.DOFS]

@@ -205,7 +205,7 @@ def surface_hessian(p: Floats, a: Vector) -> tuple[float, float, float, float]:
 
 
 def hessian_times(p: Floats, a: Vector, b: Vector) -> Vector:
-    """Multiply a vector by the second derivatives of the function of a surface.
+    """Return the product of the second derivatives of the function of a surface and a vector.
 
     Args:
         p: numbers of the surface.

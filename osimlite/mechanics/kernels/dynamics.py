@@ -169,10 +169,10 @@ def equilibrate(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, 
 
 
 def multiply_symmetric(moments: Floats, a: Vector) -> Vector:
-    """Multiply a vector by the symmetric matrix with the entries xx, yy, zz, xy, xz, yz.
+    """Return the product of a symmetric matrix, stored as its six different entries, and a vector.
 
     Args:
-        moments: entries xx, yy, zz, xy, xz, yz.
+        moments: entries xx, yy, zz, xy, xz, yz of the matrix.
         a: vector.
     """
     x, y, z = a

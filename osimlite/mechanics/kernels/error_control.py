@@ -203,10 +203,15 @@ def project_and_measure(
         data: results of an evaluation.
         t1: time at the end of the step (s).
         y0: state at the start.
-        y1: state at the end; projected.
+        y1: state at the end; projected onto the constraints.
         errors: estimated errors of y1; their component normal to the constraints is removed.
         h: record of the method.
         is_strict: whether the largest error of an auxiliary state counts, see `error_norm`.
+
+    Returns:
+        Norm of the errors, see `error_norm`; infinite if the projection fails. Where the norm is
+        more than 16 times the accepted error, or the model has no constraints, the state is not
+        projected.
     """
     error = error_norm(model, y0, errors, h, is_strict)
     # As in Simbody: a projection cannot repair an error that half a step would not.

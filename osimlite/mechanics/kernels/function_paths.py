@@ -98,7 +98,7 @@ def function_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats
 def evaluate_item(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int
 ) -> Floats:
-    """Evaluate the function of an item and return its record.
+    """Evaluate the function of an item, and fill its output record.
 
     Args:
         model: integers of the model.
@@ -107,6 +107,9 @@ def evaluate_item(
         y: state.
         f: rates of the coordinates.
         item: offset of the item in the model.
+
+    Returns:
+        Part of `data` that begins with the output record of the item.
     """
     call(model[item + ITEM.LAW], model, reals, data, y, f, item)
     return at(data, model[item + ITEM.RECORD])

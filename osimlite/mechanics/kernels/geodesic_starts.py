@@ -97,7 +97,7 @@ STRING_SWEEPS = 8
 def start_on_surface(
     p: Floats, first: Vector, second: Vector, bending: float, about: Vector, work: Floats
 ) -> Start:
-    """Find the start at which a segment between two points begins to bend around a surface.
+    """Return the start at which a segment between two points begins to bend around a surface.
 
     Args:
         p: numbers of the wrap.
@@ -107,6 +107,11 @@ def start_on_surface(
         about: axis about which the segment turns around a surface without a side, by the right-hand
             rule; zeros for either direction.
         work: workspace of a string.
+
+    Returns:
+        Angle by which the path turns on the surface (rad), 0 or less if it does not touch; point
+        where it meets the surface (m); direction of the path there; and its length on the surface
+        (m).
     """
     axis = int(p[WRAP_NUMBERS.AXIS])
     side = p[WRAP_NUMBERS.SIDE]

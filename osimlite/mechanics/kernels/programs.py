@@ -31,7 +31,7 @@ of_one = compile_text(
 def run_program(
     steps: Ints, count: int, constants: Floats, registers: Floats, variables: int
 ) -> float:
-    """Run a program and return its result.
+    """Return the result of a program, which is that of its last step; 0 without steps.
 
     Args:
         steps: operation and two registers of each step (count, 3); for the operation "number" the

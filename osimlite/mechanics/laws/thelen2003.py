@@ -77,7 +77,7 @@ class ThelenFibers(NamedTuple):
 
 
 def fibers_at(m: Thelen2003, path_length: float, length: float) -> ThelenFibers:
-    """Evaluate the curves for a path length and a fiber length (m).
+    """Return the forces of fibers and tendon and their slopes for a path length and a fiber length.
 
     Args:
         m: parameters of the muscle.
