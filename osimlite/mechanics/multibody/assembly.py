@@ -275,7 +275,7 @@ class _Search:
             q: pose to start from (n,).
 
         Raises:
-            SimulationError: the search does not converge.
+            UnmetConstraintsError: the search does not converge.
         """
         state = self._compute_state(q)
         errors = _compute_position_errors(state)

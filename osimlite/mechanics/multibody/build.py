@@ -169,7 +169,11 @@ class _Builder:
         )
 
     def _refuse_unknown(self, component: Component) -> None:
-        """Raise an error for an unknown component that would move the bodies differently."""
+        """Raise an error for an unknown component that would move the bodies differently.
+
+        Raises:
+            UnsupportedError: the component is a joint, a body or a constraint of an unknown class.
+        """
         if not isinstance(component, Unknown):
             return
         holder, path = self.tree.parent_of(component), self.placements.path(component)
@@ -255,6 +259,10 @@ class _Builder:
 
         Args:
             edges: joints of the model.
+
+        Raises:
+            UnsupportedError: a joint with coordinates closes a loop, and is a FreeJoint or has
+                ground as its child.
         """
         ground = self.placements.path(self.model.ground)
         masses = {path: body.mass for path, body in self.bodies.items()}

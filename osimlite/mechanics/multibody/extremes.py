@@ -60,7 +60,11 @@ _OF_MATH = {"math domain error", "math range error", "cannot convert float NaN t
 
 
 def methods_of_any_numbers(cls: C) -> C:
-    """Wrap all public methods of a class by `any_numbers`."""
+    """Wrap all public methods of a class by `any_numbers`.
+
+    Returns:
+        The same class.
+    """
     for name, method in [*vars(cls).items()]:
         if callable(method) and not name.startswith("_"):
             setattr(cls, name, any_numbers(method))

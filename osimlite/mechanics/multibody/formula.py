@@ -90,7 +90,7 @@ class Formula:
 
     @classmethod
     def parse(cls, text: str, variables: Sequence[str], description: str) -> Formula:
-        """Read a formula.
+        """Return the formula that a text contains.
 
         Args:
             text: the formula.
@@ -177,7 +177,10 @@ class _FormulaReader(SimplifiedSteps):
         self._waiting: list[_Waiting] = []
 
     def read(self, text: str) -> int:
-        """Read a formula and return the register of its result.
+        """Read a formula, and add its steps.
+
+        Returns:
+            Register of the result.
 
         Raises:
             FormulaError: the text is no formula.
@@ -249,7 +252,15 @@ class _FormulaReader(SimplifiedSteps):
         self._operands[waiting.before :] = [self.add(waiting.law, *arguments)]
 
     def _end_part(self, sign: str) -> bool:
-        """End an argument or a parenthesis, and return whether another operand must follow."""
+        """End an argument or a parenthesis of a formula.
+
+        Returns:
+            Whether another operand must follow.
+
+        Raises:
+            FormulaError: the comma or parenthesis belongs to no function or opening parenthesis, or
+                a function has the wrong number of arguments.
+        """
         self._apply_waiting(0)
         if not self._waiting or (sign == "," and not self._waiting[-1].name):
             raise FormulaError(f"there is an unexpected '{sign}'; remove it")

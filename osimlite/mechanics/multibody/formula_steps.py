@@ -71,12 +71,15 @@ class SimplifiedSteps:
         self._first = len(variables)
 
     def add(self, law: str, *arguments: int, value: float = 0.0) -> int:
-        """Add a step, or a simpler one with the same result, and return its register.
+        """Add a step, or a simpler one with the same result.
 
         Args:
             law: law of the step.
             arguments: registers of the operands.
             value: value of a number.
+
+        Returns:
+            Register of the result.
         """
         if law in ("number", UNKNOWN):
             return self._append_step(law, value=value)
@@ -129,12 +132,15 @@ class SimplifiedSteps:
         return tuple(steps)
 
     def _append_step(self, law: str, *arguments: int, value: float = 0.0) -> int:
-        """Add a step unless the same one exists, and return its register.
+        """Add a step unless the same one exists.
 
         Args:
             law: law of the step.
             arguments: registers of the operands.
             value: value of a number.
+
+        Returns:
+            Register of the new or existing step.
         """
         step = FormulaStep(law, arguments, value)
         if step not in self._registers:
@@ -204,7 +210,7 @@ class SimplifiedSteps:
     def _simplify(
         self, law: str, arguments: Sequence[int], constants: Sequence[float | None]
     ) -> int:
-        """Add a step with an argument that is not a number, by the rules of Lepton's optimizer.
+        """Return the register of a step after applying the rules of Lepton's optimizer to it.
 
         Args:
             law: law of the step.
@@ -393,6 +399,10 @@ class SimplifiedSteps:
         """Raise an error for a step without meaning.
 
         Lepton does not terminate for NaN.
+
+        Raises:
+            UnknownNameError: the step stands for an unknown name.
+            FormulaError: the step is a number, and this is NaN.
         """
         if step.law == UNKNOWN:
             word = self.unknown[int(step.value)]

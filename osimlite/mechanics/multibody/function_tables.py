@@ -27,12 +27,15 @@ def function_table(function: f.SmoothFunction, description: str) -> list[float]:
 
 
 def _require_table(table: list[float], function: f.SmoothFunction, description: str) -> list[float]:
-    """Return a table, or raise UnsupportedError if it is empty.
+    """Return the table of a function after checking that it is not empty.
 
     Args:
         table: table of the function.
         function: function.
         description: description of the function, for messages.
+
+    Raises:
+        UnsupportedError: the table is empty, because the kernels cannot evaluate the function.
     """
     if not table:
         name = type(function).__name__

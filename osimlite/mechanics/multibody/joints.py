@@ -184,7 +184,11 @@ def make_custom_motions(
 
 
 def _make_axis_motion(motion_kind: Literal["rotate", "translate"], axis: JointAxis) -> AxisMotion:
-    """Return the motion along or about an axis of a CustomJoint, with a unit vector."""
+    """Return the motion along or about an axis of a CustomJoint, with a unit vector.
+
+    Raises:
+        ModelError: the length of the axis is zero, infinite or NaN.
+    """
     direction = np.array(axis.axis, dtype=float)
     length = float(np.linalg.norm(direction))
     if not 0.0 < length < np.inf:
@@ -312,7 +316,11 @@ class Mobilizer:
 
 @contextmanager
 def _name_joint_in_errors(joint: str) -> Iterator[None]:
-    """Prepend the path of a joint to the messages of errors of its motions."""
+    """Prepend the path of a joint to the messages of errors of its motions.
+
+    Raises:
+        SimulationError: the code in the context raises a SimulationError.
+    """
     try:
         yield
     except SimulationError as error:

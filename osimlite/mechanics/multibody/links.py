@@ -210,6 +210,9 @@ def _list_operations(
 
     Returns:
         Operations, and the frame of the carried body in the new link (4, 4).
+
+    Raises:
+        UnsupportedError: the kernels cannot compute a motion of the joint.
     """
     joint_coordinates = mobilizer.coordinates
     chain: list[JointMotion] = [
@@ -380,7 +383,11 @@ class LinkPacker:
         self.constraint_records(constraints, lock_count)
 
     def reserve_work(self, count: int) -> int:
-        """Reserve numbers in the work vector, and return their offset."""
+        """Reserve numbers in the work vector.
+
+        Returns:
+            Offset of the first reserved number in the work vector.
+        """
         self.work += count
         return self.work - count
 

@@ -254,7 +254,11 @@ class SphericalMotion(JointMotion):
         )
 
     def _angles(self, q: Array) -> Any:
-        """Return the three angles; raise SimulationError if the second one is a right angle."""
+        """Return the three angles (rad).
+
+        Raises:
+            SimulationError: the second angle is a right angle.
+        """
         angles = q[list(self.coordinates)].tolist()
         # The rates of the angles contain 1 / cos b of the second angle b.
         if abs(math.cos(angles[1])) < 1e-12:

@@ -144,6 +144,9 @@ class ConstraintReader:
         Args:
             item: constraint of the model.
             path: path of the constraint in the model.
+
+        Raises:
+            ModelError: the distance is not positive, or not finite.
         """
         if not 0.0 < item.constant_distance < np.inf:
             raise ModelError(

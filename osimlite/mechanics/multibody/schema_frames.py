@@ -87,6 +87,11 @@ class Placements:
 
         Returns:
             Path of the body, and transform of the frame in the body (4, 4).
+
+        Raises:
+            ModelError: the position or orientation of the frame is not finite, or its stations
+                define no frame.
+            UnsupportedError: the frame is of a class that osimlite does not support.
         """
         if isinstance(frame, Body | Ground):
             return path, np.eye(4)
@@ -142,7 +147,11 @@ class Placements:
         return path
 
     def _list_stations(self, frame: StationDefinedFrame) -> list[Station]:
-        """Return the stations of points a, b and c and of the origin of a frame."""
+        """Return the stations of points a, b and c and of the origin of a frame.
+
+        Raises:
+            ModelError: a socket names a component that is not a Station.
+        """
         stations = []
         for socket in ("socket_point_a", "socket_point_b", "socket_point_c", "socket_origin_point"):
             target = self.tree.target(frame, socket, getattr(frame, socket))
@@ -165,6 +174,10 @@ class Placements:
 
         Returns:
             Path of the body, and transform of the frame in the body (4, 4).
+
+        Raises:
+            ModelError: the stations are fixed to different bodies, or the points a, b and c lie on
+                a line.
         """
         bases, points = zip(*map(self.resolve_station, self._list_stations(frame)), strict=True)
         if len(set(bases)) > 1:

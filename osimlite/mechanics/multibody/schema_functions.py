@@ -109,6 +109,9 @@ def _convert_linear(function: schema.LinearFunction, arguments: int) -> f.Smooth
     Args:
         function: function of the file.
         arguments: number of arguments.
+
+    Raises:
+        _Impossible: the function has no coefficient for an argument or for the constant.
     """
     count = len(function.coefficients)
     if count <= arguments:
@@ -134,6 +137,10 @@ def _read_points(
 
     Returns:
         Abscissae and ordinates.
+
+    Raises:
+        _Impossible: there are too few points, an abscissa has no ordinate, a number is not finite,
+            or the abscissae do not increase.
     """
     x = tuple(function.x)
     y = tuple(function.y)[: len(x)]
@@ -151,7 +158,11 @@ def _read_points(
 
 
 def _piecewise_linear(function: PiecewiseLinearFunction) -> f.SmoothFunction:
-    """Return straight lines through points; one point is a constant."""
+    """Return straight lines through points; one point is a constant.
+
+    Raises:
+        _Impossible: the points are invalid, or the first two or last two abscissae are equal.
+    """
     x, y = _read_points(function, 1)
     if len(x) == 1:
         return f.ConstantValue(y[0])
@@ -168,7 +179,11 @@ def _piecewise_constant(function: PiecewiseConstantFunction) -> f.SmoothFunction
 
 
 def _convert_gcv_spline(function: GCVSpline) -> f.SmoothFunction:
-    """Return the smoothing spline of a GCVSpline, after checks."""
+    """Return the smoothing spline of a GCVSpline, after checks.
+
+    Raises:
+        _Impossible: the half order is less than 1, or the points are invalid or too few for it.
+    """
     half_order = function.half_order
     if half_order < 1:
         raise _Impossible(f"its half_order is {half_order}; give 1 or more, 2 for a cubic spline")
@@ -180,7 +195,11 @@ def _convert_gcv_spline(function: GCVSpline) -> f.SmoothFunction:
 
 
 def _convert_step(function: StepFunction) -> f.SmoothFunction:
-    """Return a smooth step, with ascending arguments."""
+    """Return a smooth step, with ascending arguments.
+
+    Raises:
+        _Impossible: the transition starts and ends at the same time, or one of the times is NaN.
+    """
     start, end = function.transition_start_time, function.transition_end_time
     if start > end:
         # OpenSim follows the same curve from its other end.

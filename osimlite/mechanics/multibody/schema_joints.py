@@ -170,6 +170,9 @@ def _read_radii(radii: Sequence[float], path: str) -> Sequence[float]:
     Args:
         radii: half axes of the file.
         path: path of the joint, for messages.
+
+    Raises:
+        ModelError: a half axis is not finite.
     """
     # Negative radii are accepted: models use them to mirror an ellipsoid.
     if not np.isfinite(radii).all():

@@ -79,7 +79,11 @@ def spanning_tree(
     used: set[int] = set()
 
     def add(index: int) -> str:
-        """Add a joint to the tree, and return the body that it carries."""
+        """Add a joint to the tree.
+
+        Returns:
+            Path of the body that the joint carries.
+        """
         link = links[index]
         backward = link.parent not in levels
         inner, outer = (link.child, link.parent) if backward else (link.parent, link.child)
