@@ -34,7 +34,7 @@ VERSION_OPTIONS = {"--version", "--verbose", "-v"}
 
 
 def create_app(names: Sequence[str] = COMMANDS) -> Typer:
-    """Create the typer application of the given commands."""
+    """Return the typer application of the given commands."""
     import typer
 
     from osimlite.cli._help import DESCRIPTION, PROGRAM_OPTIONS
@@ -105,7 +105,7 @@ def _print_version(*, verbose: bool) -> None:
 
 
 def _unwrap_paragraphs(text: str) -> str:
-    """Join each paragraph to one line, so that the terminal can wrap it at its own width."""
+    """Return a text with each paragraph in one line, for the terminal to wrap at its own width."""
     return "\n\n".join(" ".join(paragraph.split()) for paragraph in text.split("\n\n"))
 
 

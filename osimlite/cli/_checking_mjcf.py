@@ -44,12 +44,12 @@ def print_mjcf_check(file: Path, mjcf: Path, output: Path | None) -> None:
 
 
 def _format_mm(error: float) -> str:
-    """Format an error (m) in mm; 0 if it is only rounding."""
+    """Return an error (m) as a text in mm; "0" if it is only rounding."""
     return "0" if error < 1e-9 else f"{1e3 * error:.3g}"
 
 
 def _make_table(result: Any, name: str) -> Any:
-    """Make the table of errors, one muscle per row, sorted by the error of the moment arm.
+    """Return the table of errors, one muscle per row, sorted by the error of the moment arm.
 
     Errors are root mean squares over random poses; of the moment arms, that of the worst coordinate.
     The last columns are the ratio of the implied optimal fiber length to the model's, and the

@@ -50,7 +50,7 @@ class ParameterSpec:
 
 
 def Option(*names: str, bare_value: str | None = None, **settings: Any) -> ParameterSpec:
-    """Declare an option.
+    """Return the declaration of an option.
 
     Args:
         names: spellings; by default that of the parameter.
@@ -61,7 +61,11 @@ def Option(*names: str, bare_value: str | None = None, **settings: Any) -> Param
 
 
 def Argument(**settings: Any) -> ParameterSpec:
-    """Declare a positional argument, with the keyword arguments of ``typer.Argument``."""
+    """Return the declaration of a positional argument.
+
+    Args:
+        settings: keyword arguments of ``typer.Argument``.
+    """
     return ParameterSpec("Argument", (), settings)
 
 
@@ -110,7 +114,7 @@ class _BoundParameter(NamedTuple):
         )
 
     def value(self, value_type: Any, word: str) -> Any:
-        """Convert a word; return None if typer has to convert it or to report the error.
+        """Return the value of a word; None if typer has to convert it or to report the error.
 
         Args:
             value_type: type of the value.
@@ -316,7 +320,11 @@ def _make_spec(option: OptionSpec) -> ParameterSpec:
 
 
 def command(function: Callable[..., None]) -> Command:
-    """Decorate a function as a command."""
+    """Decorate a function as a command.
+
+    Returns:
+        Command that calls the function.
+    """
     return Command(function)
 
 
@@ -330,5 +338,8 @@ def command_with(
         list_further_options: function that returns further options, which the function takes as
             keyword arguments.
         groups: names of parameters by the heading under which the help lists them.
+
+    Returns:
+        Decorator that makes a command of a function.
     """
     return lambda function: Command(function, list_further_options, groups)

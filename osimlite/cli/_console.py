@@ -42,7 +42,11 @@ class EscapingStream:
             stream.reconfigure(errors="backslashreplace")
 
     def write(self, text: str) -> int:
-        """Write text, and return the number of its characters."""
+        """Write text with escapes for its control sequences.
+
+        Returns:
+            Number of characters of `text`.
+        """
         if _output_hook is not None:
             _output_hook()
         self.stream.write(escape_control_sequences(text, starts_line=self._starts_line))
@@ -232,14 +236,14 @@ def count_columns() -> int:
 
 
 def create_console(**settings: Any) -> Console:
-    """Create a console of rich without markup, which file names and messages could contain by chance."""
+    """Return a console of rich without markup, which names of files and messages may contain."""
     from rich.console import Console
 
     return Console(**{"markup": False, "emoji": False, **settings})
 
 
 def create_table(title: str = "", **settings: Any) -> Table:
-    """Create a table without lines, in the style of all commands.
+    """Return an empty table without lines, in the style of all commands.
 
     Args:
         title: text above the table.

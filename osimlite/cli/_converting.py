@@ -69,7 +69,7 @@ class Request:
     def create(
         cls, file: Path, output: Path | None, source: str | None, target: str | None
     ) -> Request:
-        """Determine the formats and the output folder of a conversion.
+        """Return the request for a conversion, with its formats and its output folder.
 
         Args:
             file: file to convert.
@@ -174,6 +174,9 @@ class Request:
             option_values: options of the formats that were set.
             overwrite: whether files of other conversions and programs may be replaced.
 
+        Returns:
+            Written files, record of what was translated, and summary.
+
         Raises:
             SettingError: an option does not belong to the formats, or a file would be replaced that
                 this conversion has not written before.
@@ -265,7 +268,7 @@ class Request:
         option_values: Mapping[str, Any],
         guard: OutputGuard,
     ) -> Conversion:
-        """Write a model with an exporter, and return the record of what was translated.
+        """Write a model with an exporter.
 
         There are two kinds of exporters. Those of model formats, such as URDF, translate the model
         and make their own record. Those of the command `view`, such as glTF, write the scene that the
@@ -278,6 +281,9 @@ class Request:
             geometry: folders in which mesh files are searched.
             option_values: options of the exporter that were set.
             guard: guard of the output folder; it is asked before anything is written.
+
+        Returns:
+            Written files, and the record of what was translated.
 
         Raises:
             SettingError: a file would be replaced that this conversion has not written before.
@@ -319,6 +325,9 @@ class Request:
             mesh_folders: folders in which mesh files are searched.
             option_values: options of the exporter that were set.
             guard: guard of the output folder.
+
+        Returns:
+            Written file, and the record of the parts that were shown or left out.
         """
         # A scene is one file: no other file of the folder may be replaced.
         guard.protect_files(None)

@@ -51,7 +51,12 @@ def _describe_wrong_number(error: BaseException, words: Sequence[str]) -> str:
 
 
 def exit_with_message(error: BaseException, words: list[str]) -> NoReturn:
-    """Exit with a one-line message for known errors of other libraries; raise the others again."""
+    """Exit with a one-line message for known errors of other libraries; raise the others again.
+
+    Raises:
+        SystemExit: the output is closed (exit code 1), or a package is missing or the command line
+            is wrong (exit code 2).
+    """
     if isinstance(error, OSError):
         # The reader of the output has closed its end; Windows reports that as an invalid argument.
         if not isinstance(error, BrokenPipeError) and (

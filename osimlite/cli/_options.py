@@ -250,14 +250,15 @@ def list_simulation_options(
 
 
 def read_feedback(controller: Path | None, par: Path | None) -> Feedback | None:
-    """Read the controller of a file; None without a file.
+    """Return the controller in a file; None without a file.
 
     Args:
         controller: file of reflexes or of a scenario.
         par: file with values of its parameters.
 
     Raises:
-        OsimliteError: a file cannot be read, or `par` is given without a controller.
+        SettingError: `par` is given without a controller.
+        OsimliteError: a file cannot be read.
     """
     from osimlite.errors import SettingError
 
@@ -408,8 +409,10 @@ def parse_quantities(
         Numbers (rad, m, or these per second) by coordinate or state.
 
     Raises:
-        OsimliteError: a word does not have this form, the coordinate is unknown, the unit does not fit
-            it, or a value of ``--set`` without a unit is probably in degrees.
+        SettingError: a value of ``--set`` without a unit is probably in degrees, or the value of a
+            state is not a number.
+        OsimliteError: a word does not have this form, the coordinate is unknown, or the unit does
+            not fit it.
     """
     from osimlite.base.text import suggest_name
     from osimlite.errors import ModelError, OsimliteError, SettingError
@@ -452,6 +455,7 @@ def read_source(source: str, parameter: Iterable[str] | None) -> tuple[Model, Pa
         The model, and the folder of its file; None without a file.
 
     Raises:
+        SettingError: parameters are given for a model file.
         OsimliteError: the source does not exist, or does not accept the parameters.
     """
     from osimlite.errors import SettingError

@@ -109,7 +109,7 @@ def make_plan(
     controls: Sequence[str] | None = None,
     **settings: Any,
 ) -> Plan:
-    """Make the plan of a sweep from command-line options.
+    """Return the plan of a sweep that command-line options describe.
 
     Args:
         source: model file, or source of ``osimlite build``.
@@ -121,7 +121,8 @@ def make_plan(
         settings: further keyword arguments of :func:`osimlite.studies.sweep.plan.plan`.
 
     Raises:
-        OsimliteError: an option is invalid.
+        SettingError: nothing varies, or a number without a unit is probably not in rad.
+        OsimliteError: another option is invalid.
     """
     import warnings
 

@@ -70,6 +70,11 @@ def validate_paths(
 
     Returns:
         0 without findings of `fail_on` or worse, 1 with some, 2 if a file could not be processed.
+        With `diff`, 1 if a fix would change a file. With `write_baseline`, always 0.
+
+    Raises:
+        OsimliteError: an option is invalid, a path does not exist, or standard input is to be fixed
+            in place.
     """
     folders = resolve_folders(geometry)
     check_option_values(format, fail_on)
@@ -152,7 +157,7 @@ def _read_source(path: str) -> Source:
 
 
 def _check_source(source: Source, config: Config) -> Report:
-    """Check one file with the settings of its folder and of the command line."""
+    """Return the report on one file, with the settings of its folder and of the command line."""
     from osimlite.lint.engine import make_subject, run_rules
 
     assert source.file is not None
@@ -203,7 +208,11 @@ def _apply_fixes(
 
 
 def _fix_files(files: list[str], config: Config, unsafe: bool) -> tuple[int, int, bool]:
-    """Fix files and return the number of fixes, the number of remaining unsafe fixes, and whether a file failed."""
+    """Fix files in place.
+
+    Returns:
+        Number of fixes, number of remaining unsafe fixes, and whether a file could not be fixed.
+    """
     total = guesses = 0
     failed = False
     for path in files:
@@ -222,11 +231,19 @@ def _fix_files(files: list[str], config: Config, unsafe: bool) -> tuple[int, int
 
 
 def _fix_file(path: str, config: Config, unsafe: bool) -> tuple[int, int]:
-    """Fix a file in place; return the number of fixes and of remaining unsafe fixes."""
+    """Fix a file in place.
+
+    Returns:
+        Number of fixes, and number of remaining unsafe fixes.
+    """
     from osimlite.base.files import open_atomically
 
     def replace_file(pieces: list[bytes | memoryview]) -> Source:
-        """Replace the file by a fixed text in pieces, and read it again."""
+        """Replace the file by a fixed text in pieces, and read it again.
+
+        Returns:
+            Source of the new text.
+        """
         with open_atomically(path) as stream:
             stream.writelines(pieces)
         pieces.clear()
@@ -251,7 +268,12 @@ def _describe_unsafe_fixes(count: int) -> str:
 
 
 def _show_diff(path: str, config: Config, unsafe: bool) -> tuple[int, int, bool]:
-    """Print what the fixes would change; return their number, that of unsafe ones, and whether the file is unreadable."""
+    """Print what the fixes of a file would change.
+
+    Returns:
+        Number of fixes, number of remaining unsafe fixes, and whether the file cannot be read after
+        them.
+    """
     from osimlite.io.document.source import Source
 
     source = _read_source(path)

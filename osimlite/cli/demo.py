@@ -165,7 +165,11 @@ def _build_and_check(tour: _Tour) -> None:
 
 
 def _simulate_motions(tour: _Tour, pictures: bool) -> Sequence[Path]:
-    """Simulate the three models, write plots and pages, and return the paths of the pages."""
+    """Simulate the three models, and write plots and pages.
+
+    Returns:
+        Paths of the pages; none without pictures.
+    """
     from osimlite.io.document.printer import write
     from osimlite.models.source import make_model
     from osimlite.simulation.run import Simulation

@@ -259,6 +259,10 @@ def examine_package(name: str) -> Package:
     """Find the version of a package, and import it in a separate process.
 
     A separate process is needed because some packages print when imported, and some end the process.
+
+    Returns:
+        Name and version of the package, and why it cannot be loaded; the version is empty if it is
+        not installed.
     """
     try:
         version = metadata.version(name)

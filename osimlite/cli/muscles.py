@@ -150,6 +150,10 @@ def _sample_coordinates(
         mechanism: mechanism with the coordinates.
         assignments: coordinates with an optional range, NAME or NAME=LOW:HIGH.
         points: number of values.
+
+    Raises:
+        SettingError: a coordinate is unknown or named twice, or its range is missing, invalid
+            or probably in degrees.
     """
     from math import isfinite
 
@@ -195,7 +199,14 @@ def _sample_coordinates(
 def _select_common_muscles(
     first: MuscleCurves, second: MuscleCurves
 ) -> tuple[MuscleCurves, MuscleCurves]:
-    """Return the curves of both models for the muscles whose names occur in both."""
+    """Return the curves of both models for the muscles whose names occur in both.
+
+    Returns:
+        Curves of the first and of the second model, both in the order of the first.
+
+    Raises:
+        ModelError: the models have no muscle of the same name.
+    """
     from osimlite.base.text import join_words
     from osimlite.cli._console import say
     from osimlite.errors import ModelError

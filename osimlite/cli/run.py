@@ -214,7 +214,16 @@ def _run_alone(
     overwrite: bool,
     write_outside: bool,
 ) -> Outcome:
-    """Run a setup, print its messages, and return its outcome."""
+    """Run a setup, and print its messages.
+
+    Returns:
+        Outcome of the tool.
+
+    Raises:
+        DocumentError: the check of the setup found errors.
+        SystemExit: the setup could not run for another reason, which has been printed (exit code
+            2).
+    """
     import sys
 
     from osimlite.cli._console import complain, say

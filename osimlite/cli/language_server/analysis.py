@@ -137,7 +137,7 @@ class DocumentAnalysis:
         return any(rule.about == MEASURES and subject.is_for(rule) for rule in all_rules())
 
     def measure_report(self) -> Report:
-        """Measure paths and muscles, and return the findings of all rules.
+        """Return the findings of all rules, also of those that measure paths and muscles.
 
         This runs in another thread. It reads the text again because model objects are not shared
         between threads.
@@ -191,7 +191,7 @@ class DocumentAnalysis:
         return self.source.spans[number]
 
     def compute_offset(self, position: Position) -> int:
-        """Convert a position of a finding (line and column from 1) to an offset in the text."""
+        """Return the offset in the text of a position of a finding (line and column from 1)."""
         return min(
             self.source.line_start(position.line) + position.column - 1, len(self.text.content)
         )

@@ -225,5 +225,5 @@ def _make_item(
 
 
 def _escape_snippet(text: str) -> str:
-    """Escape the characters that have a meaning in a snippet."""
+    """Return a text whose characters with a meaning in snippets are escaped."""
     return text.replace("\\", "\\\\").replace("$", "\\$").replace("}", "\\}")

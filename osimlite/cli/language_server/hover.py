@@ -25,6 +25,9 @@ def describe_cursor(analysis: DocumentAnalysis, offset: int) -> types.Hover | No
     Args:
         analysis: analysis of the open file.
         offset: character offset in the text of the file.
+
+    Returns:
+        Description to show at the cursor; None if there is nothing to describe.
     """
     cursor = analysis.cursor(offset)
     element = cursor.subject

@@ -236,7 +236,7 @@ def _compute_model_edits(
 def _compute_setup_edits(
     analysis: DocumentAnalysis, target: Target, path: str
 ) -> list[types.TextEdit]:
-    """Compute the edits of the names in a setup that refer to a component or pass through it.
+    """Return the edits of the names in a setup that refer to a component or pass through it.
 
     Args:
         analysis: analysis of the setup.

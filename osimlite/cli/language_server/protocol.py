@@ -19,7 +19,7 @@ class Protocol(LanguageServerProtocol):
     """Language Server Protocol that tolerates editors which violate it."""
 
     def structure_message(self, data: dict[str, Any]) -> Any:
-        """Convert a JSON object to a message; return the object itself if it is not a message."""
+        """Return the message of a JSON object, or the object itself if it is not a message."""
         if not isinstance(data.get("method", ""), str):
             return data
         try:
@@ -81,7 +81,7 @@ def shorten_protocol_errors_in_log() -> None:
 
 
 def create_strict_converter() -> Converter:
-    """Create a converter from JSON that rejects other types where a string is required.
+    """Return a converter from JSON that rejects other types where a string is required.
 
     cattrs alone converts null to the string "None".
     """

@@ -83,11 +83,14 @@ class Server(LanguageServer):
             super().report_server_error(error, source)
 
     def analyse(self, uri: str, text: Text) -> DocumentAnalysis:
-        """Replace the analysis of an open file by one of a new text, and return it.
+        """Replace the analysis of an open file by one of a new text.
 
         Args:
             uri: URI of the open file.
             text: present text of the file.
+
+        Returns:
+            Analysis of the new text.
         """
         result = self.project.open[uri] = DocumentAnalysis(
             text, to_fs_path(uri) or uri, use_cached_measures=True
@@ -195,7 +198,7 @@ class Server(LanguageServer):
 
 
 def create_server() -> Server:
-    """Create a server with all its features registered."""
+    """Return a server with all its features registered."""
     shorten_protocol_errors_in_log()
     server = Server()
     _register_file_events(server)

@@ -36,7 +36,7 @@ class Text:
         return self.content.isascii() or self.unit == types.PositionEncodingKind.Utf32
 
     def offset(self, position: types.Position) -> int:
-        """Convert a position to an offset; positions beyond a line or the text are clipped to its end."""
+        """Return the offset of a position; beyond a line or the text, the offset of its end."""
         if position.line >= len(self._starts):
             return len(self.content)
         start = self._starts[position.line]
@@ -52,7 +52,7 @@ class Text:
         return start + len(line)
 
     def position(self, offset: int) -> types.Position:
-        """Convert an offset to a position."""
+        """Return the position (line and character from 0) of an offset."""
         line = bisect_right(self._starts, offset) - 1
         line_start = self.content[self._starts[line] : offset]
         if self._is_plain or line_start.isascii():
@@ -60,7 +60,7 @@ class Text:
         return types.Position(line, sum(map(self._width, line_start)))
 
     def range(self, start: int, end: int) -> types.Range:
-        """Convert two offsets to a range.
+        """Return the range between two offsets.
 
         Args:
             start: offset of the first character.
