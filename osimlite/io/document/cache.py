@@ -157,6 +157,9 @@ def read_object(path: str | Path, cls: type[AnyObject]) -> AnyObject:
         path: path of the document.
         cls: class of the object.
 
+    Returns:
+        Object that the document contains.
+
     Raises:
         DocumentError: the file is missing, has an object of another class, or has a misspelt
             property; with line and column.

@@ -44,10 +44,14 @@ endless one.
 def read_data(path: str | Path) -> Model:
     """Read a model from a YAML or JSON file.
 
+    Returns:
+        Model that the data describes.
+
     Raises:
-        DocumentError: the file is missing, or is not YAML or JSON; with line and column.
+        DocumentError: the file is not YAML or JSON; with line and column.
         MissingDependency: the file is YAML and PyYAML is not installed.
         ModelError: the data does not describe a model; with the position in the data.
+        MissingFileError: the file cannot be read, or is not text in UTF-8.
     """
     data_path = Path(path)
     try:
@@ -214,7 +218,11 @@ class _Reader:
     def convert_object(
         self, data: Any, accepts: type[Object], location: str, name: str = ""
     ) -> Object:
-        """Return the object that `data` describes, where a property accepts the class `accepts`."""
+        """Return the object that `data` describes, where a property accepts the class `accepts`.
+
+        Raises:
+            ModelError: the data does not describe such an object; with the position in the data.
+        """
         # The count limits what the aliases of YAML can expand to.
         self._count_values(10)
         # The short form of a set.
@@ -262,7 +270,12 @@ class _Reader:
     def _find_class(
         self, data: Mapping[str, Any], accepts: type[Object], location: str
     ) -> type[Object]:
-        """Return the class that a mapping names, or the accepted class if it names none."""
+        """Return the class that a mapping names, or the accepted class if it names none.
+
+        Raises:
+            ModelError: the mapping names a class that is unknown or not accepted, or no class where
+                the accepted one is abstract.
+        """
         tag = data.get("class")
         if tag is None:
             if accepts.abstract:
@@ -284,7 +297,12 @@ class _Reader:
         return cls
 
     def _convert_value(self, data: Any, spec: FieldSpec, location: str) -> Any:
-        """Return the value of a property from its data: objects, numbers, texts or references."""
+        """Return the value of a property from its data: objects, numbers, texts or references.
+
+        Raises:
+            ModelError: the data has another type than the property, or a value that it does not
+                accept.
+        """
         kind = spec.kind
         if isinstance(kind, ObjectField):
             assert spec.accepts is not None
@@ -321,7 +339,9 @@ class _Reader:
             raise ModelError(shorten_message(f"{location}: {error}")) from None
 
     def _parse_number(self, data: Any) -> Any:
-        """Parse a number that JSON cannot represent or that YAML reads as text (1e-9); return others unchanged.
+        """Return the number in a text, or the data unchanged if it is not such a text.
+
+        YAML reads some numbers as text (1e-9), and JSON cannot represent infinity.
 
         Raises:
             ValueError: a whole number is too large for a real number.
@@ -428,6 +448,9 @@ def parse_yaml(text: str, file: str, *, with_lines: bool = False) -> Any:
         text: YAML text.
         file: path of the file, for messages.
         with_lines: whether to return PyYAML's nodes, which know their lines, instead of data.
+
+    Returns:
+        Data of the text, or PyYAML's top node for `with_lines`; None for an empty text.
 
     Raises:
         DocumentError: the text is not YAML; with line and column in the file.

@@ -53,7 +53,7 @@ class UncleanText(Exception):
 
 
 def parse_real(word: str) -> float:
-    """Parse one number as OpenSim reads it.
+    """Return the number in a word as OpenSim reads it.
 
     Raises:
         UncleanText: only a part of the word, or nothing of it, is a number.
@@ -80,7 +80,7 @@ def parse_real(word: str) -> float:
 
 
 def parse_integer(word: str) -> int:
-    """Parse one whole number; unlike in a real number, nothing may follow it.
+    """Return the whole number in a word; unlike after a real number, nothing may follow it.
 
     Raises:
         UncleanText: the word is not a whole number.
@@ -91,7 +91,7 @@ def parse_integer(word: str) -> int:
 
 
 def parse_flag(word: str) -> bool:
-    """Parse a switch: true or false in any case, 1 or 0.
+    """Return the truth value of a switch: true or false in any case, 1 or 0.
 
     Raises:
         UncleanText: the word is something else.
@@ -105,7 +105,9 @@ def parse_flag(word: str) -> bool:
 
 
 def parse_legacy_flag(word: str) -> bool:
-    """Parse a switch of the first property system, where everything but ``true`` is false, also ``1``.
+    """Return the truth value of a switch of the first property system.
+
+    OpenSim reads everything but ``true`` as false there, also ``1``.
 
     Raises:
         UncleanText: the word is not ``true``, ``false`` or ``0``.
@@ -117,14 +119,26 @@ def parse_legacy_flag(word: str) -> bool:
 
 
 def _parse_exact_flag(word: str) -> bool:
-    """Parse a switch in a list of the first property system, where everything but lower-case ``true`` is false."""
+    """Return the truth value of a switch in a list of the first property system.
+
+    OpenSim reads everything but lower-case ``true`` as false there.
+
+    Raises:
+        UncleanText: the word is not ``true``, ``false`` or ``0`` in lower case.
+    """
     if word not in _PLAIN_FLAGS:
         raise UncleanText("ignored", word, False)
     return _PLAIN_FLAGS[word]
 
 
 def _parse_complete_real(word: str) -> float:
-    """Parse a number in a list of the first property system, where OpenSim rejects a number with a rest."""
+    """Return the number in a word of a list of the first property system.
+
+    OpenSim rejects a word there if only its beginning is a number.
+
+    Raises:
+        UncleanText: the word is not a number from end to end.
+    """
     try:
         return parse_real(word)
     except UncleanText:
@@ -137,7 +151,10 @@ def parse_text(raw: str) -> str:
 
 
 def split_words(raw: str) -> list[str]:
-    """Split a text at ASCII white space; for OpenSim a no-break space is a letter."""
+    """Return the words of a text between ASCII white space.
+
+    For OpenSim a no-break space is a letter.
+    """
     return raw.split() if raw.isascii() else _OTHER.findall(raw)
 
 
@@ -232,7 +249,11 @@ def _make_single_converter(
 def _parse_words(
     words: list[str], parse_word: Callable[[str], Any]
 ) -> tuple[list[Any], UncleanText | None]:
-    """Parse words; return the values, and the error of the first word that OpenSim cuts.
+    """Parse the words of a list one by one.
+
+    Returns:
+        Values of the words, and the error of the first word that OpenSim reads only in part or
+        ignores; None without such a word.
 
     Raises:
         UncleanText: OpenSim cannot read a word at all.
@@ -339,14 +360,20 @@ def format_shortest(value: float) -> str:
 
 
 def format_17_digits(value: float) -> str:
-    """Format a number with 17 significant digits, as OpenSim does outside lists of the first property system."""
+    """Return a number as text with 17 significant digits.
+
+    OpenSim writes numbers in this form outside lists of the first property system.
+    """
     if value == value and value not in (math.inf, -math.inf):
         return f"{value:.17g}"
     return format_shortest(value)
 
 
 def format_6_digits(value: float) -> str:
-    """Format a number with OpenSim's six digits if they read back equal, otherwise with 17."""
+    """Return a number as text with six digits if they read back equal, otherwise with 17.
+
+    OpenSim itself writes six digits.
+    """
     words = f"{value:g}"
     # A file that loses digits would not read back equal, which is worse than another spelling than
     # OpenSim's.

@@ -37,12 +37,15 @@ def encode_name(name: str) -> str:
 
 
 def decode_name(name: str) -> str:
-    """Restore the colons in a name of the element tree, or in a message of the parser."""
+    """Return a name of the element tree, or a message of the parser, with its colons restored."""
     return name.replace(_COLON, ":").replace(_XMLNS, "xmlns")
 
 
 def replace_colons(data: bytes) -> bytes:
-    """Replace colons in the names of a UTF-8 text; every character keeps its line and column."""
+    """Return a UTF-8 text with the colons in names replaced.
+
+    Every character keeps its line and column.
+    """
     pieces = []
     copied_end = 0
     hidden: list[tuple[int, int]] | None = None

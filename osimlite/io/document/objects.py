@@ -138,6 +138,9 @@ class ObjectReader:
         Args:
             element: XML element of the object.
             cls: class of the object.
+
+        Returns:
+            Object of the document; its layout holds the objects of the ``<defaults>`` block.
         """
         block = element.find(DEFAULTS)
         result: list[Object] = []
@@ -173,6 +176,9 @@ class ObjectReader:
             cls: class of the object.
             name: name that replaces the attribute `name`.
             skip: child element to skip.
+
+        Returns:
+            Object of the element; its layout holds the content that belongs to no property.
         """
         # The index counts elements in document order, so it is taken before the children are read.
         number = self.count
@@ -206,7 +212,11 @@ class ObjectReader:
         skip: etree._Element | None,
         values: dict[str, Any],
     ) -> _ExtraContent | None:
-        """Read the children of an element into `values`, by attribute; return content beyond the properties."""
+        """Read the children of an element into `values`, by the names of the properties.
+
+        Returns:
+            Content that belongs to no property; None without such content.
+        """
         steps, named = get_reading_plan(cls)
         extra: _ExtraContent | None = None
         for child in element:
@@ -279,7 +289,12 @@ class ObjectReader:
         step: ReadingStep,
         values: Mapping[str, Any],
     ) -> tuple[Any, list[_PendingNote]]:
-        """Read the element of a property that holds objects; return its value, and notes."""
+        """Read the element of a property that holds objects.
+
+        Returns:
+            Value of the property (an object, a list of objects, or None), and pending notes about
+            it.
+        """
         # The actions are integers, which are compared faster than strings.
         spec, number = step.spec, self.count
         if step.action == _ONE:
@@ -304,7 +319,11 @@ class ObjectReader:
         return members[0], deferred_notes
 
     def _add_extra_content(self, built: ReadObject, extra: _ExtraContent) -> ReadObject:
-        """Add the content beyond properties to an object, and make the pending notes final."""
+        """Add the content beyond properties to an object, and make the pending notes final.
+
+        Returns:
+            The object `built`, which is changed in place.
+        """
         extra.attach_pending(None)
         if extra.before:
             get_layout(built).before = extra.before
@@ -328,7 +347,11 @@ class ObjectReader:
     def _read_object_or_include(
         self, element: etree._Element, cls: Any, name: str | None = None
     ) -> Object:
-        """Read the object of a property, from another file if a ``file`` attribute names one."""
+        """Read the object of a property, from another file if a ``file`` attribute names one.
+
+        Returns:
+            Object of the other file; that of the element if no file is named or it cannot be read.
+        """
         file = element.get("file") if self.read_include is not None else None
         if not file or self.read_include is None:
             return self.read_object(element, cls, name)
@@ -364,7 +387,11 @@ class ObjectReader:
     def _read_members(
         self, wrapper: etree._Element, spec: FieldSpec
     ) -> tuple[ObjectList[Any], list[_PendingNote]]:
-        """Read the objects inside ``<objects>`` or another wrapper; return them and notes."""
+        """Read the objects inside ``<objects>`` or another wrapper.
+
+        Returns:
+            Members of the list, and pending notes about those of an unknown or wrong class.
+        """
         self.count += 1
         members: list[Any] = []
         deferred_notes: list[_PendingNote] = []
@@ -490,7 +517,13 @@ class ObjectReader:
         return "".join([element.text or "", *(node.tail or "" for node in element)])
 
     def _read_defaults(self, block: etree._Element) -> list[Object]:
-        """Read a ``<defaults>`` block; its objects are the defaults of objects of exactly their class."""
+        """Read a ``<defaults>`` block.
+
+        Its objects are the defaults of objects of exactly their class.
+
+        Returns:
+            Objects of the block in its order, including those of unknown classes.
+        """
         result: list[Object] = []
         for child in block:
             if not is_element(child):
@@ -511,7 +544,11 @@ class ObjectReader:
         return get_defaults(cls)[0][name] if block is None else getattr(block, name)
 
     def _apply_defaults(self, cls: type[Object], values: dict[str, Any]) -> frozenset[str]:
-        """Copy properties that the file does not contain from the document's defaults; return their names."""
+        """Copy properties that the file does not contain from the document's defaults.
+
+        Returns:
+            Names of the copied properties.
+        """
         block = self.defaults.get(cls)
         if block is None:
             return frozenset()

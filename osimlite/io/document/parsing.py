@@ -54,6 +54,9 @@ def parse_source(source: Source, *, recover: bool = False) -> etree._Element:
         source: text of the document.
         recover: whether to continue after syntax errors; the tree is then a guess.
 
+    Returns:
+        Root of the element tree.
+
     Raises:
         NotWellFormedError: the text is not well-formed (without `recover`), or declares entities.
     """
@@ -179,7 +182,11 @@ def read_version(source: Source, root: etree._Element) -> int:
 
 
 def add_suggestion(fault: DocumentError, suggestion: str | None) -> DocumentError:
-    """Add the tag that was probably meant to an error, if known."""
+    """Add the tag that was probably meant to an error, if known.
+
+    Returns:
+        The error `fault`, which is changed in place.
+    """
     if suggestion is not None:
         fault.meant = suggestion
         fault.message += f"; did you mean '{suggestion}'?"

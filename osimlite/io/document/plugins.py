@@ -108,7 +108,11 @@ def classes_in(*paths: str | PathLike[str]) -> dict[str, type[Object]]:
 
 @lru_cache(maxsize=16)
 def _load_declarations(files: tuple[tuple[str, int | None], ...]) -> Mapping[str, type[Object]]:
-    """Return the classes that declaration files define, by name."""
+    """Return the classes that declaration files define, by name.
+
+    Raises:
+        OsimliteError: a file declares a class wrongly, or has data of unexpected types.
+    """
     result: dict[str, type[Object]] = {}
     for path, _ in files:
         try:
@@ -209,7 +213,7 @@ class _Declarations:
         return self.classes[name]
 
     def make_class(self, name: str) -> type[Object]:
-        """Make one class from its entry in the file."""
+        """Return a class that is made from its entry in the file."""
         entry = self.check_mapping(self.entries[name], _OF_A_CLASS, f"class '{name}'", name)
         if not name.isidentifier():
             raise self.make_error(f"'{name}' is not a legal name of a class", name)

@@ -126,6 +126,9 @@ def read(path: str | Path, *, classes: Paths = ()) -> Model:
         classes: files that declare the classes of plug-ins; without them, objects of such classes
             stay text.
 
+    Returns:
+        Model that the file contains.
+
     Raises:
         DocumentError: the file is missing or is not an OpenSim model; with line and column.
         OsimliteError: a declaration of a class is wrong; with file and line.
@@ -143,6 +146,9 @@ def read_any(path: str | Path, *, classes: Paths = ()) -> Object:
         path: path of the document.
         classes: files that declare the classes of plug-ins.
 
+    Returns:
+        Object at the top of the document.
+
     Raises:
         DocumentError: the file is missing or is not an OpenSim document; with line and column.
         OsimliteError: a class is declared wrongly; with file and line.
@@ -159,6 +165,9 @@ def read_text(text: str | bytes, *, classes: Paths = ()) -> Model:
     Args:
         text: text of the document; bytes are decoded as a file would be.
         classes: files that declare the classes of plug-ins.
+
+    Returns:
+        Model that the text contains.
 
     Raises:
         DocumentError: the text is not an OpenSim model; with line and column.
@@ -182,6 +191,9 @@ def read_document(
         expected_class: class of the object at the top, or one of its bases.
         to_check: whether to find text between elements and attributes without meaning, for the
             linter.
+
+    Returns:
+        Document with its object, text, version and notes.
 
     Raises:
         DocumentError: the text is not an OpenSim document, or has an object of another class; with
@@ -214,7 +226,7 @@ def read_document(
 def read_tree(
     source: Source, root: etree._Element, version: int, expected_class: type[Object] = Model
 ) -> Document:
-    """Convert an element tree to a document.
+    """Return the document that an element tree describes.
 
     Args:
         source: text from which the tree was parsed.
@@ -223,8 +235,8 @@ def read_tree(
         expected_class: class of the object at the top, or one of its bases.
 
     Raises:
-        DocumentError: the document has no such object, or content of an older version that cannot be
-            upgraded.
+        DocumentError: the document has no such object, or content of an older version that cannot
+            be upgraded.
     """
     with pause_collector():
         if version < CURRENT_VERSION:
@@ -305,7 +317,11 @@ def _build_document(
     upgraded: UpgradeResult | None,
     is_known: bool = False,
 ) -> Document:
-    """Make the objects of an element tree, and map notes to the old text after an upgrade."""
+    """Make the objects of an element tree, and map notes to the old text after an upgrade.
+
+    Returns:
+        Document with its objects; after an upgrade its notes name elements of the old text.
+    """
     reader = ObjectReader(_make_include_reader(source))
     top = _read_top(source, root if upgraded is None else upgraded.root, reader, expected_class)
     get_layout(top).version, get_layout(top).file = version, source.file
@@ -335,7 +351,11 @@ def _upgrade_tree(source: Source, root: etree._Element, version: int) -> Upgrade
 def _map_to_old_text(
     source: Source, top: Object, notes: list[Note], upgraded: UpgradeResult
 ) -> list[Note]:
-    """Replace indices of elements in the upgraded tree by those in the old text."""
+    """Replace indices of elements in the upgraded tree by those in the old text.
+
+    Returns:
+        Notes with the indices of elements in the old text.
+    """
     source.old_indices = upgraded.old_indices
     numbers = upgraded.numbers
     if numbers is None:
@@ -352,7 +372,11 @@ def _map_to_old_text(
 
 
 def _check_leftovers(source: Source, version: int, notes: list[Note]) -> None:
-    """Reject a very old document with unknown elements, which the upgrade would lose."""
+    """Reject a very old document with unknown elements, which the upgrade would lose.
+
+    Raises:
+        VersionError: the document is older than `FIRST_COMPLETE_VERSION` and has unknown elements.
+    """
     unknown_notes = [note for note in notes if note.kind in _UNKNOWN_KINDS]
     if version >= FIRST_COMPLETE_VERSION or not unknown_notes:
         # Newer documents lose what OpenSim loses as well; of older ones nothing is known.
@@ -369,7 +393,14 @@ def _check_leftovers(source: Source, version: int, notes: list[Note]) -> None:
 def _read_top(
     source: Source, root: etree._Element, reader: ObjectReader, expected_class: type[Object]
 ) -> Object:
-    """Read the object of a document, with the comments around it."""
+    """Read the object of a document, with the comments around it.
+
+    Returns:
+        Object of the document.
+
+    Raises:
+        DocumentError: the document has no object of the class `expected_class`.
+    """
     first_element = find_first_element(root)
     cls = find_tagged_class(first_element)
     if first_element is None or cls is None or not issubclass(cls, expected_class):

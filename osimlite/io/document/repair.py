@@ -217,7 +217,11 @@ def _replace_by_blanks(text: str) -> str:
 
 
 def _repair_outside(text: str, offset: int, repairs: list[Repair]) -> str:
-    """Remove text before or after the root element."""
+    """Remove text before or after the root element.
+
+    Returns:
+        Text with blanks in place of what was removed.
+    """
     before, nul, _ = text.partition("\0")
     if offset and nul and not before.strip():
         repairs.append(Repair("overlooked", offset + len(before), nul, "OpenSim reads no further"))
@@ -241,7 +245,7 @@ def _repair_outside(text: str, offset: int, repairs: list[Repair]) -> str:
 
 
 def _repair_comment(piece: str, offset: int, repairs: list[Repair]) -> str:
-    """Replace hyphens that a comment must not have by dashes."""
+    """Return a comment with dashes in place of the hyphens that it must not have."""
     # Without "<!--" and "-->".
     comment_text = piece[4:-3]
     result = _HYPHENS.search(comment_text)
@@ -256,7 +260,11 @@ def _repair_comment(piece: str, offset: int, repairs: list[Repair]) -> str:
 
 
 def _repair_attributes(piece: str, offset: int, repairs: list[Repair]) -> str:
-    """Remove repeated attributes but the last, which counts for OpenSim."""
+    """Remove repeated attributes but the last, which counts for OpenSim.
+
+    Returns:
+        Tag with blanks in place of the removed attributes.
+    """
     # The last one counts for OpenSim, the first for most other programs.
     matches = list(ATTRIBUTE.finditer(piece))
     last = {match["name"]: match for match in matches}
@@ -310,6 +318,9 @@ def _escape_ampersands(text: str, offset: int, repairs: list[Repair]) -> str:
 
     References of HTML are replaced by their characters. Of a reference by a number that is no
     character, OpenSim keeps one byte.
+
+    Returns:
+        Text in which every ampersand begins a reference that XML accepts.
     """
     if "]]>" in text:
         repairs += [

@@ -83,7 +83,7 @@ class Source:
 
     @classmethod
     def from_file(cls, path: str | Path) -> Source:
-        """Read a file.
+        """Return the source with the content of a file.
 
         Raises:
             MissingFileError: the file does not exist or cannot be read.
@@ -93,7 +93,7 @@ class Source:
 
     @classmethod
     def from_text(cls, text: str, file: str | None = None) -> Source:
-        """Make a source of decoded text; an encoding that the text declares is ignored.
+        """Return the source of a decoded text; an encoding that the text declares is ignored.
 
         Args:
             text: decoded text of a document.
@@ -328,7 +328,7 @@ def _detect_encoding(data: bytes) -> str:
 
 
 def _decode_text(data: bytes, encoding: str) -> str:
-    """Decode bytes; with cp1252, bytes that are not valid UTF-8 are decoded one by one."""
+    """Return decoded bytes; with cp1252, bytes that are not valid UTF-8 are decoded one by one."""
     if encoding != "cp1252":
         return data.decode(encoding, "replace")
     codecs.register_error("osimlite.cp1252", _decode_windows)

@@ -100,12 +100,16 @@ _REMARK = compile_later(r"<(?P<special>!--|!\[CDATA\[|\?|!DOCTYPE)")
 def blank_comments(text: str, character: str = " ") -> str:
     """Replace every character of comments, CDATA sections, instructions and DOCTYPEs by another.
 
-    Those without an end stay. An ending that was not found once is not searched again, so the time is
-    linear; a pattern such as ``<!--.*?-->`` would search the rest of the text for each open comment.
+    Those without an end stay. An ending that was not found once is not searched again, so the time
+    is linear; a pattern such as ``<!--.*?-->`` would search the rest of the text for each open
+    comment.
 
     Args:
         text: text of a document.
         character: character that replaces each of them.
+
+    Returns:
+        Text in which all other characters have their old offsets.
     """
     pieces: list[str] = []
     missing_endings: set[str] = set()
@@ -288,7 +292,11 @@ class PlainSpans(Sequence[Span]):
         return comment < 0 or text.find("-->", comment, offset) >= 0
 
     def _find_closing_tag(self, tag: str, offset: int) -> int:
-        """Return the offset of the closing tag of an element whose content starts at `offset`."""
+        """Return the offset of the closing tag of an element whose content starts at `offset`.
+
+        Raises:
+            AssertionError: the text is not well-formed, because the element has no closing tag.
+        """
         close = self.text.find("<", offset)
         if self.text[close + 1] == "/":
             return close

@@ -39,6 +39,9 @@ def survey_source(source: Source, *, expected_class: type[Object] = Model) -> Su
     Args:
         source: text of the document.
         expected_class: class of the object, or one of its bases.
+
+    Returns:
+        Document as far as it could be read, and the errors of the text.
     """
     try:
         return Survey(source, read_document(source, expected_class=expected_class, to_check=True))
@@ -72,7 +75,11 @@ def survey_source(source: Source, *, expected_class: type[Object] = Model) -> Su
 def _survey_damaged(
     source: Source, fault: NotWellFormedError, expected_class: type[Object]
 ) -> Survey:
-    """Survey a text that is not well-formed, as far as a repaired text can be parsed."""
+    """Survey a text that is not well-formed, as far as a repaired text can be parsed.
+
+    Returns:
+        Document as far as it could be read, and the syntax error of the text.
+    """
     result = Survey(source, None, [fault], fault.line)
     unclosed = re.search(r"of line (\d+) is not closed", fault.message)
     if unclosed:

@@ -164,6 +164,9 @@ def upgrade(root: Element, version: int) -> UpgradeResult:
         root: root of the document, of any class.
         version: format version of the document.
 
+    Returns:
+        Upgraded tree, with the changes that the steps made.
+
     Raises:
         UpgradeError: the document has content that no step can carry over.
     """
@@ -181,9 +184,12 @@ def upgrade(root: Element, version: int) -> UpgradeResult:
 
 
 def rename_old_classes(root: Element) -> UpgradeResult | None:
-    """Rename the classes of a current document that have an old name; return None without one.
+    """Rename the classes of a current document that have an old name.
 
     OpenSim accepts the old names in documents of every version.
+
+    Returns:
+        Tree with the changes; None if no class has an old name.
     """
     draft = Draft(root, CURRENT_VERSION)
     draft.step = _load_step(*STEP_TABLE[0])

@@ -22,6 +22,9 @@ def move_engine_content(draft: Draft) -> None:
     """Move the content of <DynamicsEngine> to the model.
 
     Later formats can express the content of Simbody's engine only.
+
+    Raises:
+        UpgradeError: the document describes its bodies for another engine than Simbody's.
     """
     model = draft.model
     if model is None:
@@ -48,7 +51,11 @@ _UNIT_AXES = ("1 0 0", "0 1 0", "0 0 1")
 
 
 def convert_transform_axes(draft: Draft) -> None:
-    """Turn <TransformAxisSet> into a <SpatialTransform> of six axes."""
+    """Turn <TransformAxisSet> into a <SpatialTransform> of six axes.
+
+    Raises:
+        UpgradeError: a joint has more than three axes of rotation or of translation.
+    """
     for joint, old in find_with_child(draft.find_tagged("CustomJoint"), "TransformAxisSet"):
         # Old axes say whether they rotate; new ones know by their order, rotations first.
         axes_by_type: dict[str, list[Element]] = {"rotation": [], "translation": []}

@@ -231,7 +231,7 @@ class Draft:
         source: Element,
         name: str | None = None,
     ) -> Element:
-        """Append a new element to `parent` and return it.
+        """Append a new element to `parent`.
 
         Args:
             parent: element that gets the new child.
@@ -239,6 +239,9 @@ class Draft:
             text: text of the element; None for no text.
             source: element of the old document that it comes from, for positions in messages.
             name: value of the attribute `name`; None for no attribute.
+
+        Returns:
+            The new element.
         """
         new = etree.SubElement(parent, tag)
         new.text = text
@@ -279,12 +282,15 @@ class Draft:
         parent.remove(element)
 
     def rename_child(self, parent: Element, old: str, new: str) -> bool:
-        """Rename the first child with the tag `old` to `new`; return whether there was one.
+        """Rename the first child with the tag `old` to `new`.
 
         Args:
             parent: parent of the child.
             old: present tag.
             new: new tag.
+
+        Returns:
+            Whether there was such a child.
         """
         child = parent.find(old)
         if child is None:

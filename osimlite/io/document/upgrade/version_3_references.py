@@ -169,9 +169,12 @@ def add_linker_frames(draft: Draft) -> None:
 def _add_frame(
     draft: Draft, owner: Element, body: str, socket: Element, pose: list[Element | None]
 ) -> str:
-    """Add an offset frame of `body` to the owner's list; return its name.
+    """Add an offset frame of `body` to the owner's list.
 
     OpenSim gives both frames of one body the same name, and then uses the first for either side.
+
+    Returns:
+        Name of the new frame.
     """
     location, orientation = pose
     source = next((part for part in pose if part is not None), socket)
@@ -274,7 +277,11 @@ def convert_point_coordinates(draft: Draft) -> None:
 
 
 def _convert_body(draft: Draft, owner: Element, tag: str, socket: str) -> bool:
-    """Turn the body name in `tag` into its path in `socket`; return whether the tag exists."""
+    """Turn the body name in `tag` into its path in `socket`.
+
+    Returns:
+        Whether the owner has an element with this tag.
+    """
     child = owner.find(tag)
     if child is None:
         return False

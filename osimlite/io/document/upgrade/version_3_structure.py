@@ -94,7 +94,7 @@ def _rename_references(draft: Draft, renamed: dict[str, str]) -> None:
 
 
 def _rename_in_list(text: str, renamed: dict[str, str]) -> str:
-    """Replace old names in a list of names, the longest first."""
+    """Return a list of names, as text, with the old names replaced."""
     for old, new in sorted(renamed.items(), key=lambda pair: -len(pair[0])):
         # The longest first: a name may be a part of another one.
         text = f" {text} ".replace(f" {old} ", f" {new} ").strip()
