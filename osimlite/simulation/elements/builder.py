@@ -164,6 +164,9 @@ class ElementBuilder:
         Args:
             force: force component of the model.
             field: property that names the coordinate.
+
+        Raises:
+            ModelError: the property is empty, or the mechanism has no coordinate of this name.
         """
         named = getattr(force, field)
         if not named:

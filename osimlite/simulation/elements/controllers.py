@@ -60,6 +60,10 @@ def _drive_from_file(
         builder: builder of the model's elements.
         controller: the controller.
         driven_actuators: actuators that the controller drives already.
+
+    Raises:
+        ModelError: a column is not an actuator, or is one that another column or entry of the
+            controller drives.
     """
     path = builder.path(controller)
     actuators = map_actuators(builder)

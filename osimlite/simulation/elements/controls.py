@@ -190,6 +190,10 @@ def _iterate_drives(builder: ElementBuilder) -> Iterator[tuple[Controller, Drive
     """Yield the drives of each enabled controller, with the controller.
 
     `CONTROLLERS` has the function of each class of controllers.
+
+    Raises:
+        ModelError: an enabled CorrectionController needs the states of a tool, which a model does
+            not have.
     """
     for controller in builder.find_components(Controller):
         if isinstance(controller, Unknown):

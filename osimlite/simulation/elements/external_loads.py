@@ -196,7 +196,7 @@ def read_loads_table(loads: ExternalLoads, folder: Path, file: str | None) -> St
 
 
 def _read_table(path: str) -> StoTable:
-    """Read a table of forces; a .c3d file is converted to forces, points and torques."""
+    """Return a table of forces; a .c3d file is converted to forces, points and torques."""
     return read_c3d_forces(path) if Path(path).suffix.lower() == ENDING else read_sto(path)
 
 

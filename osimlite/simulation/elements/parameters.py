@@ -32,17 +32,29 @@ class Tail:
         self.record_size = record_size
 
     def append_ints(self, ints: Sequence[int]) -> int:
-        """Append integers, and return the offset of the first from the start of the record."""
+        """Append integers to the record.
+
+        Returns:
+            Offset of the first appended integer from the start of the record.
+        """
         self.ints += ints
         return self._first[0] + len(self.ints) - len(ints)
 
     def append_numbers(self, numbers: Sequence[float]) -> int:
-        """Append numbers, and return the offset of the first from the record's numbers."""
+        """Append numbers to those of the record.
+
+        Returns:
+            Offset of the first appended number from the record's numbers.
+        """
         self.numbers += numbers
         return self._first[1] + len(self.numbers) - len(numbers)
 
     def reserve_record(self, count: int) -> int:
-        """Reserve numbers in the output record, and return their offset."""
+        """Reserve numbers at the end of the output record.
+
+        Returns:
+            Offset of the first reserved number in the output record.
+        """
         self.record_size += count
         return self.record_size - count
 

@@ -37,10 +37,13 @@ class Registry:
         self._declarations: dict[str, Any] = {}
 
     def register(self, component: type, declaration: T) -> T:
-        """Register the declaration of a class, and return the declaration.
+        """Register the declaration of a class.
+
+        Returns:
+            The same declaration.
 
         Raises:
-            TypeError: the table does not name the class, or names another module for it.
+            TypeError: no table names the class.
         """
         name = component.__name__
         if name not in self.modules:
@@ -67,7 +70,7 @@ class Registry:
         return self._declarations[name]
 
     def __iter__(self) -> Iterator[Any]:
-        """Yield all declarations, sorted by the names of their kernels."""
+        """Return an iterator over all declarations, sorted by the names of their kernels."""
         return map(self.find, sorted(self.modules, key=kernel_name))
 
     def find_kernel(self, name: str) -> Any:
@@ -137,13 +140,21 @@ PATHS = Registry(
 
 
 def register_force_type(declaration: T) -> T:
-    """Register a force type, or a class of elements, under the class in its attribute `component`."""
+    """Register a force type, or a class of elements, under the class in its attribute `component`.
+
+    Returns:
+        The same declaration.
+    """
     component: type = declaration.component  # type: ignore[attr-defined]
     return FORCE_TYPES.register(component, declaration)
 
 
 def register_probe_type(declaration: T) -> T:
-    """Register a probe type under the class in its attribute `component`."""
+    """Register a probe type under the class in its attribute `component`.
+
+    Returns:
+        The same declaration.
+    """
     component: type = declaration.component  # type: ignore[attr-defined]
     return PROBE_TYPES.register(component, declaration)
 

@@ -64,13 +64,20 @@ def run_many(
     options: BatchOptions,
     numbers: ArrayLike | None = None,
 ) -> Runs:
-    """Compute a batch; see :meth:`osimlite.simulation.batches.BatchEngine.run_many`.
+    """Return the results of a batch of runs with compiled kernels.
+
+    See :meth:`osimlite.simulation.batches.BatchEngine.run_many`.
 
     Args:
         engine: the engine.
         states: initial states (W, y).
         options: options of the batch.
         numbers: numbers of models of the same structure (W, m); by default the engine's.
+
+    Raises:
+        SettingError: an option has no meaning.
+        OsimliteError: the shapes of the states or numbers do not fit, or there is not one
+            controller for each run.
     """
     from concurrent.futures import ThreadPoolExecutor
 

@@ -173,7 +173,7 @@ def warn_first_time(sentence: str) -> None:
 
 
 def _load_library(path: Path, symbol: str) -> int:
-    """Load a library, and return the address of its function."""
+    """Return the address of a function of a library, which remains loaded."""
     library = ctypes.CDLL(os.path.realpath(path))
     address = ctypes.cast(library[symbol], ctypes.c_void_p).value
     _libraries.append(library)

@@ -183,6 +183,9 @@ class ControlledSteps(Stepper):
         Args:
             times: times of reports, s.
             to: end of the run, s.
+
+        Raises:
+            ValueError: the first time of reports is before the current time.
         """
         if times and times[0] < self.time:
             raise ValueError(f"t = {times[0]:.9g} s is before the current time, {self.time:.9g} s")
@@ -263,6 +266,9 @@ class ControlledSteps(Stepper):
 
         Args:
             errors: errors of the last attempted step (y,).
+
+        Raises:
+            IntegrationError: always; its message says why the shortest step fails.
         """
         t0, y0 = self.time, self.state
         h = max(shortest_step(self.time, self.attempted), self._options.step_bounds[0])

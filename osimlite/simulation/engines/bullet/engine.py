@@ -161,7 +161,12 @@ class BulletEngine(KernelEngine):
     def _supply_matrix(
         self, model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, unused: int
     ) -> None:
-        """Write mass matrix and bias; see :class:`osimlite.simulation.pack_chain.Chain`."""
+        """Write mass matrix and bias; see :class:`osimlite.simulation.pack_chain.Chain`.
+
+        Raises:
+            SimulationError: Bullet refuses the inertias of the model, which are invalid after its
+                rounding.
+        """
         robot, client, first = self.world.id, self.world.client, self._forces
         values, rates, accelerations = data[self._motion_offset : first].reshape(3, -1).tolist()
         try:
