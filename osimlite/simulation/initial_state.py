@@ -87,7 +87,7 @@ def describe_suspect_value(info: CoordinateInfo, name: str, value: float | str) 
 
 
 def convert_state(path: str, value: float | str) -> float:
-    """Convert the value of a state without a unit to a number.
+    """Return the value of a state that has no unit as a number.
 
     Args:
         path: path of the state.
@@ -190,7 +190,11 @@ def resolve_initial_values(
 
 
 def _check_finite(value: float, quantity: str, name: str) -> float:
-    """Return a number as a float; raise SettingError if it is not finite."""
+    """Return a number as a float after checking that it is finite.
+
+    Raises:
+        SettingError: the number is infinite or NaN.
+    """
     if not isfinite(value):
         raise SettingError(f"the {quantity} of coordinate '{name}' is {value}; give a number")
     return float(value)

@@ -251,7 +251,11 @@ def muscle_curves(
 
 
 def _select_muscles(paths: list[str], names: Sequence[str]) -> list[str]:
-    """Return the named paths in the order of the model; all without names."""
+    """Return the named paths, or all paths if there are no names, in the order of the model.
+
+    Raises:
+        SettingError: the model has no muscle with one of the names.
+    """
     # Reversed, so that of several muscles of one name the first is found.
     path_of_name = {
         key: path for path in reversed(paths) for key in (path.rpartition("/")[2], path)

@@ -101,7 +101,7 @@ class Packer(LinkPacker):
         self.runs: dict[int, str] = {}
 
     def pack_model(self) -> PackedModel:
-        """Write all records of the model, and return the packed model."""
+        """Return the packed model, with all records of the model."""
         ints = self.ints
         self.mechanism_records(*select_constraints(self.link_map.mechanism, self.order))
         if self.chain is not None:

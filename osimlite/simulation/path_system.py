@@ -338,6 +338,9 @@ class PathSystem(System):
         """Raise a SimulationError where kernels in Python raise an arithmetic error.
 
         Machine code computes NaN there, which the kernels report as an outcome.
+
+        Raises:
+            SimulationError: the code in the context raises an ArithmeticError or a ValueError.
         """
         try:
             yield

@@ -193,7 +193,8 @@ class RecordedMotion(Movement):
 
         Raises:
             DocumentError: the file is not a table, has no rows, its times do not increase, a
-                coordinate is not a number, or no column is a coordinate of the mechanism.
+                coordinate is not a finite number or is too large, or no column is a coordinate of
+                the mechanism.
             ModelError: the mechanism has no coordinates.
         """
         return cls.from_table(mechanism, read_sto(path))
@@ -205,6 +206,11 @@ class RecordedMotion(Movement):
         Args:
             mechanism: the mechanism.
             table: table of coordinates or states.
+
+        Raises:
+            DocumentError: the table has no rows, its times do not increase, a coordinate is not a
+                finite number or is too large, or no column is a coordinate of the mechanism.
+            ModelError: the mechanism has no coordinates.
         """
         if not len(table.times):
             raise DocumentError("the motion has no rows", file=table.file)
@@ -367,7 +373,11 @@ class RecordedMotion(Movement):
         )
 
     def _require_time_count(self, purpose: str) -> None:
-        """Raise SettingError if there are fewer times than splines of fifth degree need."""
+        """Check that there are as many times as splines of fifth degree need.
+
+        Raises:
+            SettingError: the motion has fewer times than these splines need.
+        """
         count = len(self.around[0] if self.around else self.times)
         if count < 2 * _HALF_SPLINE_ORDER:
             raise SettingError(

@@ -511,7 +511,10 @@ class Simulation:
     ) -> Trajectory:
         # Reports are computed when they are first read, which may be after the next run.
         def evaluate_with_controls(function: Callable[[Engine], Any]) -> Any:
-            """Evaluate a function of the engine with the controls of this run; later runs may have set others."""
+            """Return the value of a function of the engine under the controls of this run.
+
+            Later runs may have set other controls.
+            """
             with self._lock:
                 self.engine.set_controls(controls)
                 return function(self.engine)

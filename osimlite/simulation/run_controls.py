@@ -43,7 +43,11 @@ class PythonFunction(SmoothFunction):
     name: str  # name of the control, for messages
 
     def evaluate(self, arguments: Arguments) -> FunctionDerivatives:
-        """Return the value at a time, with zero derivatives."""
+        """Return the value at a time, with zero derivatives.
+
+        Raises:
+            SettingError: the control at this time is infinite or NaN.
+        """
         x = float(arguments[0])
         value = float(self.function(x))
         if not isfinite(value):
@@ -147,7 +151,9 @@ def parse_controls(words: Iterable[str]) -> dict[str, Any]:
         Controls by the name of the actuator.
 
     Raises:
-        OsimliteError: a word is neither, or two of them set the same control.
+        SettingError: a word is neither a file nor ``NAME=VALUE`` with a number, or two words set the
+            same control.
+        OsimliteError: a file cannot be read.
     """
     result: dict[str, Any] = {}
     for word in words:
@@ -183,7 +189,12 @@ def require_table_span(controls: Controls, start: float, to: float) -> None:
 
 
 def _map_by_name(user_controls: Mapping[str, Any] | StoTable | str | Path) -> Mapping[str, Any]:
-    """Return controls by actuator from a mapping, a table or a file."""
+    """Return controls by actuator from a mapping, a table or a file.
+
+    Raises:
+        SettingError: the controls are of another type, or two columns of a table have the same
+            label.
+    """
     if isinstance(user_controls, Mapping):
         return user_controls
     # .xml is the older format of control sets.

@@ -186,7 +186,11 @@ class Stepper(ABC):
             self._observe(t, y)
 
     def _require_later(self, limit: float) -> None:
-        """Raise ValueError if the limit of a step (s) is not after the present time."""
+        """Check that the limit of a step (s) is after the present time.
+
+        Raises:
+            ValueError: the limit is not after the present time.
+        """
         if not limit > self.time:
             raise ValueError(
                 f"the limit {limit:.9g} s of the step is not after the present {self.time:.9g} s"
@@ -216,11 +220,14 @@ class Stepper(ABC):
         return derivative
 
     def _refuse_non_finite(self, t: float, derivative: Sequence[float]) -> None:
-        """Raise an IntegrationError that names the first entry that is not finite, if there is one.
+        """Check that all entries of a derivative are finite.
 
         Args:
             t: time, s.
             derivative: derivative of the state.
+
+        Raises:
+            IntegrationError: an entry is infinite or NaN; the error names the first one.
         """
         for index, value in enumerate(derivative):
             if not isfinite(value):
