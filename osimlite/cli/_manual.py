@@ -24,7 +24,7 @@ PAGES = {
     "osimlite.cli.format": "docs/format-and-diff.md",
     "osimlite.cli.gait": "docs/gaits.md",
     "osimlite.cli.ik": "docs/fitting.md#inverse-kinematics",
-    "osimlite.cli.info": "docs/format-and-diff.md#setup-files-and-other-documents",
+    "osimlite.cli.info": "docs/format-and-diff.md#tables-setup-files-and-other-documents",
     "osimlite.cli.inverse_dynamics": "docs/from-opensim.md#kinematics-and-dynamics",
     "osimlite.cli.kinematics": "docs/from-opensim.md#kinematics-and-dynamics",
     "osimlite.cli.lsp": "docs/editors.md",
