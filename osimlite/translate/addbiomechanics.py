@@ -140,7 +140,11 @@ class SubjectFolder:
         return written
 
     def _write_models(self, base: Path) -> list[Path]:
-        """Write the models of the passes; also a version for OpenSim if Nimble reads one otherwise."""
+        """Write the models of the passes; also a version for OpenSim if Nimble reads one differently.
+
+        Returns:
+            Paths of the written files.
+        """
         files = []
         names = UniqueNames()
         make_folder(base / "models")
@@ -196,7 +200,11 @@ class SubjectFolder:
     def _write_trial(
         self, trial: B3dTrial, base: Path, name: str
     ) -> tuple[list[Path], dict[str, object]]:
-        """Write the files of a trial, and return them with facts for the summary."""
+        """Write the files of a trial.
+
+        Returns:
+            Paths of the written files, and facts about the trial for the summary.
+        """
         folder = make_folder(base / "trials" / name)
         trial_path = f"/trials/{name}"
         times = trial.times
@@ -516,6 +524,10 @@ def _create_setups(
 
 
 def _write_document(path: Path, document: Any) -> Path:
-    """Write a document of OpenSim, and return its path."""
+    """Write a document of OpenSim.
+
+    Returns:
+        Path of the file.
+    """
     write_atomically(path, to_text(document))
     return path

@@ -69,7 +69,13 @@ class BioMod:
     robot: Robot
 
     def write(self, folder: str | Path) -> list[Path]:
-        """Write ``<name>.bioMod`` and ``<name>.coordinates.json`` into a folder, which is made if it does not exist."""
+        """Write ``<name>.bioMod`` and ``<name>.coordinates.json`` into a folder.
+
+        The folder is made if it does not exist.
+
+        Returns:
+            Paths of the written files.
+        """
         files: dict[str, str | bytes] = {
             f"{self.name}.bioMod": self.text,
             f"{self.name}.coordinates.json": self.coordinates,
@@ -91,6 +97,9 @@ def to_biomod(
         name: name of the files without suffix; that of the model by default.
         folder: folder of the model file, as for other exporters; not used here.
         geometry: folders with mesh files, as for other exporters; not used here.
+
+    Returns:
+        Texts of the files, and the record of what was translated, approximated or left out.
 
     Raises:
         ModelError: the model is not a mechanism.

@@ -40,7 +40,11 @@ class Bvh:
     fidelity: Fidelity
 
     def write(self, folder: str | Path) -> list[Path]:
-        """Write ``<name>.bvh`` into a folder, which is made if it does not exist."""
+        """Write ``<name>.bvh`` into a folder, which is made if it does not exist.
+
+        Returns:
+            Path of the written file, in a list.
+        """
         path = make_folder(folder) / f"{self.name}.bvh"
         with open_atomically(path) as stream:
             for chunk in format_bvh(self.motion):
@@ -61,7 +65,8 @@ def to_bvh(
 
     Args:
         model: model to translate.
-        motion: file of the coordinates over time (.sto, .mot); None for one frame, the default pose.
+        motion: file of the coordinates over time (.sto, .mot); None for one frame, the default
+            pose.
         scale: numbers of the file per metre.
         name: name of the file without suffix; that of the model by default.
         folder: folder of the model file, as for other exporters; not used here.
@@ -166,7 +171,11 @@ class BvhMarkers:
         }
 
     def write(self, folder: str | Path) -> list[Path]:
-        """Write the markers into a folder, which is made if it does not exist."""
+        """Write the markers into a folder, which is made if it does not exist.
+
+        Returns:
+            Path of the written file, in a list.
+        """
         path = make_folder(folder) / f"{self.name}.trc"
         rows = self.positions.reshape(len(self.positions), -1)
         write_trc(path, self.motion.times.tolist(), self.markers, rows)

@@ -121,8 +121,12 @@ def to_urdf(
             OSIMLITE_GEOMETRY, separated as in PATH, follow them.
         name: name of the files without ending; by default that of the model.
 
+    Returns:
+        URDF text with its mesh files, and the account of what became of every component.
+
     Raises:
-        OsimliteError: a limit is not a positive number, or `limits` or `locked` has an unknown value.
+        OsimliteError: a limit is not a positive number, or `limits` or `locked` has an unknown
+            value.
         ModelError: the model is not a valid mechanism: a frame or body is missing or not connected.
         UnsupportedError: a joint or constraint is not supported.
     """

@@ -51,7 +51,7 @@ class Exporter:
 
 
 def write_urdf(*model: Any, **options: Any) -> Urdf:
-    """Translate a model to URDF; see :func:`osimlite.to_urdf`."""
+    """Return a model translated to URDF; see :func:`osimlite.to_urdf`."""
     # Importing a translator takes time, and each command needs at most one.
     from osimlite.translate.export import to_urdf
 
@@ -59,43 +59,59 @@ def write_urdf(*model: Any, **options: Any) -> Urdf:
 
 
 def write_mjcf(*model: Any, **options: Any) -> Mjcf:
-    """Translate a model to MJCF; see :func:`osimlite.to_mjcf`."""
+    """Return a model translated to MJCF; see :func:`osimlite.to_mjcf`."""
     from osimlite.translate.mjcf.export import to_mjcf
 
     return to_mjcf(*model, **options)
 
 
 def write_bvh(*model: Any, **options: Any) -> Bvh:
-    """Translate a model and its motion to BVH; see :func:`osimlite.translate.bvh.to_bvh`."""
+    """Return a model and its motion as BVH; see :func:`osimlite.translate.bvh.to_bvh`."""
     from osimlite.translate.bvh import to_bvh
 
     return to_bvh(*model, **options)
 
 
 def write_biomod(*model: Any, **options: Any) -> BioMod:
-    """Translate a model for biorbd; see :func:`osimlite.translate.biomod.to_biomod`."""
+    """Return a model translated for biorbd; see :func:`osimlite.translate.biomod.to_biomod`."""
     from osimlite.translate.biomod import to_biomod
 
     return to_biomod(*model, **options)
 
 
 def write_page(model_view: ModelView, path: Path) -> str:
-    """Write a page for browsers, and return its name and size."""
+    """Write a page for browsers.
+
+    Returns:
+        Path and size of the file, in words.
+    """
     return f"{model_view.write_page(path)} ({_megabytes(path)})"
 
 
 def write_glb(model_view: ModelView, path: Path) -> str:
-    """Write a file of glTF, and return its name and size."""
+    """Write a file of glTF.
+
+    Returns:
+        Path and size of the file, in words.
+    """
     return f"{model_view.write_glb(path)} ({_megabytes(path)})"
 
 
 def write_rerun(model_view: ModelView, path: Path) -> str:
-    """Write a recording for the viewer of Rerun, and return its name, its size and how to open it."""
+    """Write a recording for the viewer of Rerun.
+
+    Returns:
+        Path and size of the file, and how to open it, in words.
+    """
     return f"{model_view.write_rrd(path)} ({_megabytes(path)}); open it with: rerun {path}"
 
 
 def write_screenshot(model_view: ModelView, path: Path, *, at: float | None) -> str:
-    """Write a picture of a moment (s), and return its name."""
+    """Write a picture of the model at the time `at` (s).
+
+    Returns:
+        Path of the file.
+    """
     return str(model_view.write_picture(path, SCREENSHOT_SIZE, at))
 
 

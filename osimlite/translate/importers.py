@@ -74,7 +74,7 @@ class Importer:
 
 
 def read_mjcf(path: Path, *, written_for: str | None = None, **options: Any) -> Osim:
-    """Convert an MJCF file to an OpenSim model; see :func:`osimlite.from_mjcf`."""
+    """Return the OpenSim model converted from an MJCF file; see :func:`osimlite.from_mjcf`."""
     from osimlite.translate.mjcf_import.convert import from_mjcf
 
     version: Any = written_for
@@ -151,7 +151,10 @@ MJCF_CHOICES = (
 
 
 def read_subject(path: Path, *, name: str, processing_pass: str | None = None) -> Imported:
-    """Read a subject of AddBiomechanics; see :class:`osimlite.translate.addbiomechanics.SubjectFolder`."""
+    """Return a subject of AddBiomechanics.
+
+    See :class:`osimlite.translate.addbiomechanics.SubjectFolder`.
+    """
     from osimlite.translate.addbiomechanics import SubjectFolder
 
     return SubjectFolder(path, name, processing_pass)
@@ -172,7 +175,7 @@ B3D_CHOICES = (
 
 
 def read_bvh(path: Path, **options: Any) -> BvhMarkers:
-    """Read joint centres of a BVH file; see :class:`osimlite.translate.bvh.BvhMarkers`."""
+    """Return the joint centres of a BVH file; see :class:`osimlite.translate.bvh.BvhMarkers`."""
     from osimlite.translate.bvh import BvhMarkers
 
     return BvhMarkers(path, **options)

@@ -120,6 +120,9 @@ def _turn_ellipsoid(joint: EllipsoidJoint, tree: Tree) -> NimbleChange:
     OpenSim rotates by Rx(q0) Ry(q1) Rz(q2), Nimble by Ry(q0) Rx(-q1) Rz(q2). With E = Rz(90 deg),
     Nimble's rotation is E Rx(q0) Ry(q1) Rz(q2) E^T, and the centre moves on an ellipsoid
     with the radii (ry, rx, rz).
+
+    Returns:
+        Description of the difference and of the change.
     """
     path = joint.path
     sockets = ("socket_parent_frame", "socket_child_frame")
@@ -143,7 +146,11 @@ def _turn_ellipsoid(joint: EllipsoidJoint, tree: Tree) -> NimbleChange:
 
 
 def _rewrite_custom_joint(joint: CustomJoint) -> list[NimbleChange]:
-    """Replace axes and functions of a CustomJoint by those with which Nimble moves it."""
+    """Replace axes and functions of a CustomJoint by those with which Nimble moves it.
+
+    Returns:
+        One difference if an axis was changed, otherwise none.
+    """
     nimble_joint = classify_custom_joint(joint)
     names = [coordinate.name for coordinate in joint.coordinates]
     axes = list(joint.spatial_transform.axes().values())
@@ -204,9 +211,12 @@ def _flip(axis: TransformAxis) -> tuple[float, float, float]:
 def _build_custom_axes(
     joint: CustomJoint, axes: Sequence[TransformAxis], vectors: Sequence[tuple[float, float, float]]
 ) -> list[tuple[tuple[float, float, float], Function, str]]:
-    """Return vector, function and coordinate of the six axes of a joint that stays a CustomJoint in Nimble.
+    """Return vector, function and coordinate of the six axes of a CustomJoint of Nimble.
 
     Translations along anything but the positive axes X, Y and Z get lost in Nimble.
+
+    Raises:
+        UnsupportedError: an axis has no function, so that Nimble cannot read the joint.
     """
     names = [coordinate.name for coordinate in joint.coordinates]
     _orthogonalize(joint, vectors[:3], may_tilt=False)
@@ -297,7 +307,11 @@ def _is_unit(vector: Sequence[float], index: int) -> bool:
 def _replace_axis(
     axis: TransformAxis, vector: tuple[float, float, float], function: Function, name: str
 ) -> bool:
-    """Give an axis another vector, function and coordinate; return whether that changes the motion."""
+    """Give an axis another vector, function and coordinate.
+
+    Returns:
+        Whether this changes the motion.
+    """
     if _describe(tuple(axis.axis), axis.function, axis.names) == _describe(
         vector, function, [name]
     ):
@@ -329,7 +343,11 @@ def _describe(
 def _extend_splines(joint: CustomJoint) -> list[NimbleChange]:
     """Extend the splines of a CustomJoint to the ranges of its coordinates.
 
-    Beyond its points a SimmSpline continues as a cubic in Nimble, and as a straight line in OpenSim.
+    Beyond its points a SimmSpline continues as a cubic in Nimble, and as a straight line in
+    OpenSim.
+
+    Returns:
+        One difference if a spline was extended, otherwise none.
     """
     ranges = {coordinate.name: coordinate.range for coordinate in joint.coordinates}
     extended_axes = []
@@ -384,7 +402,11 @@ def _extend_spline(spline: SimmSpline, lower: float, upper: float) -> None:
 
 
 def _note_bend(joint: ConstantCurvatureJoint) -> list[NimbleChange]:
-    """Note that a ConstantCurvatureJoint bends farther in Nimble, if its ranges allow it."""
+    """Note that a ConstantCurvatureJoint bends farther in Nimble, if its ranges allow it.
+
+    Returns:
+        One difference if a range allows a larger bend than OpenSim, otherwise none.
+    """
     for coordinate, neutral in zip(joint.coordinates, joint.neutral_angle_x_z_y, strict=False):
         # The neutral angle adds to the coordinate.
         if max(abs(limit + neutral) for limit in coordinate.range) > MAX_BEND_RAD:
@@ -398,7 +420,11 @@ def _note_bend(joint: ConstantCurvatureJoint) -> list[NimbleChange]:
 
 
 def _release_constraints(model: Model) -> list[NimbleChange]:
-    """Turn off the constraints between coordinates and bodies that Nimble moves."""
+    """Turn off the constraints between coordinates and bodies that Nimble moves.
+
+    Returns:
+        One difference for each constraint and each prescribed coordinate that was released.
+    """
     free_names = {coordinate.name for coordinate in list_coordinates(model)}
     changes = []
     for constraint in model.components(Constraint):

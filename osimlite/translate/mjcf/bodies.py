@@ -81,7 +81,11 @@ def add_frames(draft: MjcfDraft) -> None:
 
 
 def _add_chain(draft: MjcfDraft, chain: list[RobotJoint], name: str) -> _Element:
-    """Add the element of the body at the end of a chain of joints to the body that carries it."""
+    """Add the element of the body at the end of a chain of joints to the body that carries it.
+
+    Returns:
+        Element of the body at the end of the chain.
+    """
     parent, start = draft.frames[chain[0].parent]
     moving_indices = [index for index, joint in enumerate(chain) if joint.kind != "fixed"]
     # A longer chain is cut: a carrier body with negligible inertia has the first joints.
@@ -170,6 +174,9 @@ def _repair_moments(moments: Array) -> Array:
     """Raise the smallest principal moment until none exceeds the sum of the others.
 
     This holds in floating point as well.
+
+    Returns:
+        Repaired principal moments (3,), kg·m².
     """
     repaired = moments.copy()
     smallest, middle, largest = np.argsort(moments)

@@ -92,6 +92,9 @@ def check_mjcf(model: Model, file: str | Path, *, poses: int = 50, seed: int = 7
         poses: number of random poses, uniform over the ranges of all coordinates.
         seed: seed of the poses.
 
+    Returns:
+        Errors of the muscles and of the positions of bodies, and what the file lacks.
+
     Raises:
         MissingDependency: mujoco is not installed.
         OsimliteError: MuJoCo cannot load the file.
@@ -103,7 +106,15 @@ def check_mjcf(model: Model, file: str | Path, *, poses: int = 50, seed: int = 7
 
 
 def _compare(mujoco: Any, model: Model, file: str | Path, poses: int, seed: int) -> Check:
-    """Compare a MuJoCo file with a model; for the arguments see :func:`check_mjcf`."""
+    """Compare a MuJoCo file with a model; for the arguments see :func:`check_mjcf`.
+
+    Returns:
+        Errors of the muscles and of the positions of bodies, and what the file lacks.
+
+    Raises:
+        OsimliteError: MuJoCo cannot load the file.
+        ModelError: the model has no muscles or other paths, or none in common with the file.
+    """
     try:
         mj_model = mujoco.MjModel.from_xml_path(str(file))
     except ValueError as error:

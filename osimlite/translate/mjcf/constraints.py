@@ -38,7 +38,11 @@ def add_constraints(draft: MjcfDraft) -> None:
 def _add_site_equality(
     tag: str, draft: MjcfDraft, equations: b.WeldEquations | b.PointEquations
 ) -> str:
-    """Add an equality of a kind ("weld" or "connect") between two sites."""
+    """Add an equality of a kind ("weld" or "connect") between two sites.
+
+    Returns:
+        Kind and name of the element.
+    """
     name = draft.make_name("equality", equations.name)
     sites = [draft.add_site(equations.name, *end) for end in (equations.first, equations.second)]
     add_element(draft.get_section("equality"), tag, name=name, site1=sites[0], site2=sites[1])
@@ -46,7 +50,11 @@ def _add_site_equality(
 
 
 def _add_distance(draft: MjcfDraft, constraint: b.DistanceConstraint) -> str:
-    """Add a tendon of constant length; MuJoCo measures from its length with all joints at zero."""
+    """Add a tendon of constant length; MuJoCo measures from its length with all joints at zero.
+
+    Returns:
+        Kind and name of the element.
+    """
     name = add_straight_tendon(
         draft,
         constraint.name,
@@ -73,6 +81,9 @@ def _add_point_on_line(draft: MjcfDraft, equations: b.PointOnLineEquations) -> s
     """Add a light body that slides along the line, and connect it to the follower.
 
     MuJoCo has no constraint of a point to a line.
+
+    Returns:
+        Kind and name of the element.
     """
     name = draft.make_name("joint", equations.name)
     frame = np.eye(4)

@@ -97,6 +97,9 @@ def _make_geom(
     """Return the attributes of a geom and its frame (4, 4) in that of the geometry.
 
     A mesh without a file gives None.
+
+    Raises:
+        Untranslatable: MuJoCo has no such surface, or a radius is not positive.
     """
     match geometry:
         case ContactSphere() if geometry.radius > 0.0:
@@ -126,7 +129,11 @@ def _make_geom(
 
 
 def _add_pairs(draft: MjcfDraft, force: ContactForce) -> Iterator[str]:
-    """Add a pair for any two surfaces of a force that are on different bodies; yield their names."""
+    """Add a pair for any two surfaces of a force that are on different bodies.
+
+    Yields:
+        Name of each pair.
+    """
     for (first_surface, first_friction), (second_surface, second_friction) in combinations(
         _iterate_surfaces(draft, force), 2
     ):
@@ -168,7 +175,11 @@ def _add_pairs(draft: MjcfDraft, force: ContactForce) -> Iterator[str]:
 def _iterate_surfaces(
     draft: MjcfDraft, force: ContactForce
 ) -> Iterator[tuple[ContactGeometry, float]]:
-    """Yield the surfaces of a force with the dynamic friction coefficient of each."""
+    """Yield the surfaces of a force with the dynamic friction coefficient of each.
+
+    Raises:
+        ModelError: the force names a contact geometry that the model does not have.
+    """
     if isinstance(force, SmoothSphereHalfSpaceForce):
         for socket in ("socket_sphere", "socket_half_space"):
             surface = draft.tree.target(force, socket, getattr(force, socket))

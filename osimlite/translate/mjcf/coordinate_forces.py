@@ -168,6 +168,9 @@ def _add_tendon(
     """Add a tendon whose length is the coordinate plus a constant.
 
     It is slack between two values of the coordinate.
+
+    Returns:
+        Kind and name of the element.
     """
     slope, start = leader.line
     # The length of the tendon is the coordinate plus start / slope.
@@ -183,7 +186,12 @@ def _add_tendon(
 def _find_lead(
     draft: MjcfDraft, force: CoordinateActuator | SpringGeneralizedForce | CoordinateLimitForce
 ) -> tuple[Lead, int]:
-    """Return the joint of the coordinate of a force, and the index of the coordinate."""
+    """Return the joint of the coordinate of a force, and the index of the coordinate.
+
+    Raises:
+        Untranslatable: the force names no coordinate, or one that is locked or has no separate
+            joint.
+    """
     if not force.coordinate:
         raise Untranslatable("it names no coordinate")
     path = draft.tree.path_of(draft.tree.target(force, "coordinate", force.coordinate)) or ""

@@ -147,6 +147,9 @@ def _add_argument_joint(draft: MjcfDraft, coordinate_index: int) -> Lead:
     """Add a joint for a coordinate that is only the argument of functions.
 
     It turns a small body about its centre.
+
+    Returns:
+        The new joint, whose position is the value of the coordinate.
     """
     coordinate = draft.mechanism.coordinates[coordinate_index]
     name = joint_names(draft.mechanism)[coordinate_index]

@@ -138,6 +138,9 @@ def add_element(parent: _Element, tag: str, **attributes: Value) -> _Element:
         tag: tag of the element.
         attributes: attributes of the element.
 
+    Returns:
+        The new element.
+
     Raises:
         UnsupportedError: a number is not finite, which MJCF cannot express.
     """
@@ -379,6 +382,9 @@ class MjcfDraft:
             element: element to which it is added.
             frame: frame in the element (4, 4).
             inertia: principal moments (kg·m²).
+
+        Returns:
+            Element of the new body.
         """
         speck = add_element(
             element,

@@ -170,6 +170,9 @@ def to_mjcf(
             OSIMLITE_GEOMETRY, separated as in PATH, follow them.
         name: name of the files without ending; by default that of the model.
 
+    Returns:
+        MJCF text with its other files, and the account of what became of every component.
+
     Raises:
         SettingError: an option has a value that it does not accept.
         ModelError: the model is not a valid mechanism: a frame or body is missing or not connected.

@@ -62,6 +62,9 @@ def _fit_piece(piece: Tendon, compute_residuals: Residuals) -> Tendon:
     """Fit a piece of a tendon.
 
     All numbers are fitted together by least squares, then the side of each surface, repeatedly.
+
+    Returns:
+        Piece with the smallest error; `piece` itself if no fit reduces the error.
     """
     search = require("scipy.optimize", extra="sim", purpose="fits of tendons").least_squares
     best = piece

@@ -152,7 +152,11 @@ def add_straight_tendon(draft: MjcfDraft, path: str, sites: list[str], **law: fl
 def _add_site_motor(
     draft: MjcfDraft, path: str, gear: Array, site: str, axes: str | None = None
 ) -> str:
-    """Add a motor at a site with a gear (6,), along the axes of another site if one is named."""
+    """Add a motor at a site with a gear (6,), along the axes of another site if one is named.
+
+    Returns:
+        Kind and name of the element.
+    """
     name = draft.make_name("actuator", path)
     add_element(
         draft.get_section("actuator"), "motor", name=name, site=site, refsite=axes, gear=gear
@@ -164,12 +168,19 @@ def _add_point_site(draft: MjcfDraft, owner: Component, path: str, socket: str, 
     """Add a site at a point of a body.
 
     OpenSim uses the body even where the socket names a frame on it.
+
+    Returns:
+        Name of the site.
     """
     return draft.add_site(path, draft.find_placement(owner, socket).body, np.array(point))
 
 
 def _normalize_axis(axis: tuple[float, float, float]) -> Array:
-    """Return a direction as a unit vector (3,)."""
+    """Return a direction as a unit vector (3,).
+
+    Raises:
+        Untranslatable: the direction is zero.
+    """
     length = float(np.linalg.norm(axis))
     if length == 0.0:
         raise Untranslatable("its direction is zero")

@@ -188,7 +188,11 @@ class _TendonWriter:
     _geoms: dict[tuple[Any, ...], str] = field(default_factory=dict)
 
     def write_tendon(self, path: str, tendon: Tendon) -> str:
-        """Write a tendon with its sites and wrap geoms; return its name."""
+        """Write a tendon with its sites and wrap geoms.
+
+        Returns:
+            Name of the tendon.
+        """
         name = self.draft.make_name("tendon", path)
         element = add_element(
             self.draft.get_section("tendon"),
@@ -212,7 +216,11 @@ class _TendonWriter:
         return name
 
     def _write_site(self, path: str, tendon_site: TendonSite) -> str:
-        """Write a site of a tendon, with the bodies that move it, and return its name."""
+        """Write a site of a tendon, with the bodies that move it.
+
+        Returns:
+            Name of the site.
+        """
         if tendon_site.slides is None:
             return self.draft.add_site(
                 path, tendon_site.body, tendon_site.position, group=WRAP_GROUP
@@ -252,7 +260,11 @@ class _TendonWriter:
         return site
 
     def _write_geom(self, path: str, wrap_geom: WrapGeom) -> str:
-        """Write the geom of a surface, and return its name."""
+        """Write the geom of a surface.
+
+        Returns:
+            Name of the geom, which may have been written before.
+        """
         # Muscles share wrap objects; equal geoms are written once.
         key = (
             wrap_geom.body,

@@ -120,6 +120,9 @@ def sample_function(function: f.SmoothFunction, x: Array) -> Array:
         function: function of one argument.
         x: values of the argument (k,).
 
+    Returns:
+        Values of the function (k,).
+
     Raises:
         FloatingPointError: a value is too large for a fit.
     """

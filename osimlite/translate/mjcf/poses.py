@@ -110,6 +110,9 @@ def multiply_each_pose(rows: Array, matrices: Array) -> Array:
     Args:
         rows: rows (k, P, i), (P, i) or (i,).
         matrices: matrices (P, i, j).
+
+    Returns:
+        Products (k, P, j), or (P, j) if `rows` has no axis k.
     """
     if rows.ndim < 3:
         return np.asarray((rows[..., None, :] @ matrices)[..., 0, :])
@@ -144,7 +147,7 @@ def measure_arm_errors(mechanism: Mechanism, arms: Array, samples: PathSamples) 
 
 
 def draw_values(mechanism: Mechanism, count: int, seed: int) -> Array:
-    """Draw random values (count, n) of the coordinates, uniform over the ranges of the free ones.
+    """Return random values (count, n) of the coordinates, uniform over the ranges of the free ones.
 
     Without a valid range, they are within 1 (rad or m) of the default value.
 

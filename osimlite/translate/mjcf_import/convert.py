@@ -203,7 +203,11 @@ def from_mjcf(
 
 
 def start_draft(path: Path, options: ImportOptions) -> ConversionDraft:
-    """Compile a file, and return a draft without components."""
+    """Compile a file, and start the draft of its OpenSim model.
+
+    Returns:
+        Draft with the settings of the file, and without bodies.
+    """
     source = load_mjcf(path)
     mj_model: Any = source.model
     gravity = [float(value) for value in mj_model.opt.gravity]

@@ -169,6 +169,9 @@ def make_geodesic_path(
         segments: segments of a tendon with one branch.
         hints: point near the contact of each segment, in the frame of its geom (3,), m; None for a
             straight segment.
+
+    Returns:
+        Path with a point for each site, and an obstacle for each segment with a hint.
     """
     model = draft.mj
 

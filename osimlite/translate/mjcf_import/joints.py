@@ -62,7 +62,7 @@ class JointGroup(NamedTuple):
 
 
 def group_joints(draft: ConversionDraft, body: int) -> list[JointGroup]:
-    """Divide the joints of a body into groups of one OpenSim joint each."""
+    """Return the joints of a body in groups of one OpenSim joint each."""
     model = draft.mj
     groups: list[JointGroup] = []
     slides: list[int] = []
@@ -185,7 +185,11 @@ def _make_custom_joint(draft: ConversionDraft, group: JointGroup, name: str) -> 
 
 
 def _make_coordinate(draft: ConversionDraft, joint: int, value: float) -> Coordinate:
-    """Make the coordinate of a hinge or slide."""
+    """Make the coordinate of a hinge or slide.
+
+    Returns:
+        Coordinate with its default value and range (rad or m).
+    """
     model = draft.mj
     name = draft.unique("coordinate", draft.source.name_of("joint", joint))
     is_rotational = int(model.jnt_type[joint]) == HINGE
@@ -218,7 +222,11 @@ def _make_coordinate(draft: ConversionDraft, joint: int, value: float) -> Coordi
 def _make_special_joint(
     draft: ConversionDraft, joint: int, name: str, position: Array, rotation: Array
 ) -> CustomJoint:
-    """Make a ball or free joint as a CustomJoint of body-fixed X-Y-Z angles."""
+    """Make a ball or free joint as a CustomJoint of body-fixed X-Y-Z angles.
+
+    Returns:
+        Joint with three coordinates for a ball joint, six for a free joint.
+    """
     model = draft.mj
     is_free = int(model.jnt_type[joint]) == FREE
     base = draft.source.name_of("joint", joint)
@@ -535,7 +543,7 @@ def _is_independent(model: object, joint: int, other_joints: list[int]) -> bool:
 
 
 def _complete_axes(axes: list[Array]) -> list[Array]:
-    """Append perpendicular axes to a list of axes until there are three."""
+    """Return a list of axes, completed to three by axes perpendicular to them."""
     result = list(axes)
     while len(result) < 3:
         if not result:

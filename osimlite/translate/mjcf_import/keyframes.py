@@ -11,7 +11,11 @@ from osimlite.translate.mjcf_import.draft import ConversionDraft
 
 
 def add_keyframes(draft: ConversionDraft) -> None:
-    """Write all keyframes into a table, and set the default pose from the requested keyframe."""
+    """Write all keyframes into a table, and set the default pose from the requested keyframe.
+
+    Raises:
+        SettingError: the file has no keyframe with the requested name.
+    """
     model = draft.mj
     names = [draft.source.name_of("key", key) for key in range(model.nkey)]
     requested = draft.options.keyframe

@@ -237,7 +237,11 @@ def _make_exact(
     limits: tuple[float, float],
     detail: str,
 ) -> RigidTendonMuscle:
-    """Make a muscle with MuJoCo's curves as formulas."""
+    """Make a muscle with MuJoCo's curves as formulas.
+
+    Returns:
+        Muscle with a rigid tendon and without activation dynamics.
+    """
     curves = [
         ExpressionBasedFunction(name=curve_name, expression=formula, variables=("x",))
         for curve_name, formula in zip(

@@ -42,7 +42,11 @@ class Bench:
         self._count = 0
 
     def add(self, path: AbstractGeometryPath) -> int:
-        """Add a candidate, and return its number."""
+        """Add a candidate.
+
+        Returns:
+            Index of the candidate, from 0.
+        """
         self.model.add(PathActuator(name=f"candidate_{self._count}", geometry_path=path))
         self._count += 1
         return self._count - 1

@@ -137,6 +137,9 @@ def make_geometry_path(
         segments: segments of a tendon with one branch.
         quadrants: part of its surface around which each segment wraps: ``"all"`` for either side,
             ``"+x"`` for the side of the side site, None for no wrapping.
+
+    Returns:
+        Path with a point for each site, and a wrap for each segment that wraps.
     """
     model = draft.mj
     sites = [segments[0].first, *(segment.second for segment in segments)]

@@ -97,7 +97,7 @@ def _draw(
 
 
 def _make_parts(draft: ConversionDraft, geom: int) -> list[_Part] | None:
-    """Make the shapes of a geom; None if it has none, which is recorded."""
+    """Return the shapes of a geom; None if it has none, which is recorded."""
     model = draft.mj
     size = [float(value) for value in model.geom_size[geom]]
     geom_type = int(model.geom_type[geom])

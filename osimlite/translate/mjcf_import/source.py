@@ -85,6 +85,9 @@ def load_mjcf(path: Path) -> MjcfSource:
     Args:
         path: path of the file (.xml).
 
+    Returns:
+        Compiled model, with MuJoCo's module, version and warnings.
+
     Raises:
         MissingDependency: MuJoCo is not installed.
         MissingFileError: there is no such file.
@@ -116,7 +119,12 @@ def load_mjcf(path: Path) -> MjcfSource:
 
 
 def _require_plausible_numbers(path: Path, model: Any) -> None:
-    """Raise an error for numbers that no mechanism has."""
+    """Raise an error for numbers that no mechanism has.
+
+    Raises:
+        DocumentError: a number is not finite or is larger than `LARGEST_NUMBER`, or a joint axis is
+            not a unit vector.
+    """
     for name in CHECKED_ARRAYS:
         values = np.asarray(getattr(model, name), dtype=float)
         # `not <=` refuses NaN as well.
@@ -133,7 +141,11 @@ def _require_plausible_numbers(path: Path, model: Any) -> None:
 
 
 def _try_in_another_process(path: Path) -> None:
-    """Raise an error if MuJoCo rejects the file, or crashes on it."""
+    """Raise an error if MuJoCo rejects the file, or crashes on it.
+
+    Raises:
+        DocumentError: MuJoCo rejects the file, crashes on it, or does not finish in time.
+    """
     code = (
         "import sys, mujoco\n"
         "mujoco.set_mju_user_warning(lambda text: None)\n"

@@ -464,7 +464,7 @@ def _make_straight_path(
     surfaces: Surfaces,
     segments: tuple[TendonSegment, ...],
 ) -> GeometryPath:
-    """Make a path through the sites of a branch that wraps around nothing."""
+    """Return a path through the sites of a branch that wraps around nothing."""
     return make_geometry_path(draft, frames, surfaces, segments, (None,) * len(segments))
 
 
@@ -499,7 +499,11 @@ def _find_reach(
 
 
 def _make_linear_path(draft: ConversionDraft, tendon: Tendon) -> TendonPath:
-    """Make the path of a fixed tendon, which is a linear function of joint positions."""
+    """Make the path of a fixed tendon, which is a linear function of joint positions.
+
+    Returns:
+        Path, and the constant (m) that keeps its length positive.
+    """
     names = []
     coefficients = []
     shortest = 0.0
