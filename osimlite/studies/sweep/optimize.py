@@ -153,11 +153,16 @@ def optimize(
             this machine.
         progress: callback during the search.
 
+    Returns:
+        Best value of the objective with the values of the variables, the number of evaluations, why
+        the search ended, and the paths of the best model and the history.
+
     Raises:
         SweepInterruption: the user has pressed Ctrl-C; the search can be resumed.
         SimulationError: no run has succeeded.
-        OsimliteError: an argument is out of bounds, the model cannot be simulated, or the folder
-            has results of other settings.
+        SettingError: an argument is out of bounds, every variable has one value only, or the
+            folder has results of other settings.
+        OsimliteError: the model cannot be simulated, or the cluster cannot be reached.
     """
     minimize = find_method(method)
     reject_grid_ranges(plan.variables)
@@ -233,7 +238,12 @@ def _resolve_start(
     start: Sequence[float] | Mapping[str, float] | None,
     is_bounded: bool,
 ) -> Floats:
-    """Return the first point (f,) as fractions of the ranges of the free variables."""
+    """Return the first point (f,) as fractions of the ranges of the free variables.
+
+    Raises:
+        SettingError: a sequence does not have one value for each variable, or a start value is
+            outside its range.
+    """
     if not isinstance(start, Mapping):
         if start is not None and len(start) != len(plan.variables):
             raise SettingError(
@@ -281,7 +291,14 @@ def read_best_values(folder: str | Path) -> dict[str, float]:
 def _open_history(
     path: Path, table: Any, resume: bool, force: bool, evaluations: _Evaluations
 ) -> PartialTable:
-    """Open the history for new rows, and give the rows that it has to the evaluations."""
+    """Open the history for new rows, and give the rows that it has to the evaluations.
+
+    Returns:
+        Table to which new rows of the history are added.
+
+    Raises:
+        SettingError: the history has other settings, or more runs than the budget.
+    """
     if path.is_file() and not force and not (resume and get_partial_path(path).exists()):
         protect_results(path, json.loads(table.metadata[SETTINGS_KEY]))
         pq = require("pyarrow.parquet", extra="sweep", purpose="a table of results")
@@ -494,7 +511,14 @@ def _finish_search(
     settings: dict[str, Any],
     ending: str,
 ) -> Optimum:
-    """Write the best model, parameters and summary."""
+    """Write the best model, parameters and summary.
+
+    Returns:
+        Result of the search, with the paths of the files.
+
+    Raises:
+        SimulationError: no run has come to its end, or the objective is finite in none.
+    """
     if evaluations.best is None:
         if evaluations.reason:
             raise SimulationError(f"no run came to its end: {evaluations.reason}")

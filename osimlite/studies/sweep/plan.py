@@ -218,7 +218,7 @@ def plan(
     controls: Mapping[str, Any] = MappingProxyType({}),
     **options: Any,
 ) -> Plan:
-    """Make a plan of runs.
+    """Return a plan of runs.
 
     Args:
         source: model, or a function that makes it from parameters.
@@ -309,7 +309,11 @@ def plan(
 
 
 def _read_bounds(gain: Gain) -> tuple[float, float]:
-    """Return the bounds of a parameter of the controller as a range."""
+    """Return the bounds of a parameter of the controller as a range.
+
+    Raises:
+        SettingError: a bound is not finite.
+    """
     if not (isfinite(gain.low) and isfinite(gain.high)):
         raise SettingError(
             f"the parameter '{gain.name}' has no bounds, such as <0,2> in 1~0.1<0,2>; give its range, for "
@@ -340,7 +344,12 @@ def _make_stops(
 
 
 def _make_stop(mechanism: Mechanism, name: str, level_text: float | str, is_below: bool) -> Stop:
-    """Return the stop at a level (rad, m, or text with a unit) of a coordinate that moves."""
+    """Return the stop at a level (rad, m, or text with a unit) of a coordinate that moves.
+
+    Raises:
+        SettingError: the coordinate does not exist or is locked, or the level is not a finite
+            number.
+    """
     infos = {key: info for info in mechanism.coordinates for key in (info.name, info.path)}
     if name not in infos:
         raise SettingError(f"there is no coordinate '{name}'{suggest_name(name, infos)}")

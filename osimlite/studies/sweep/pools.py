@@ -26,6 +26,9 @@ def make_pool(
         cluster: address of a Dask scheduler, such as `tcp://127.0.0.1:8786`; None for workers on
             this machine.
 
+    Yields:
+        Pool that runs samples of the plan; it is closed at the end of the context.
+
     Raises:
         SettingError: the settings exclude each other.
         OsimliteError: the cluster cannot be reached.
@@ -84,6 +87,9 @@ def run_packed(packed: bytes, values: Floats) -> Block:
     Args:
         packed: plan from `Plan.pack`.
         values: values of the variables of the samples (k, d).
+
+    Returns:
+        Results of the samples, in their order.
 
     Raises:
         OsimliteError: the plan cannot be run.

@@ -149,10 +149,14 @@ def sweep(
         cluster: address of a Dask scheduler whose workers run the samples instead.
         progress: callback during the sweep.
 
+    Returns:
+        Path of the results, numbers of new runs by status, reasons of failures, and the duration.
+
     Raises:
         SweepInterruption: the user has pressed Ctrl-C; the sweep can be resumed.
-        OsimliteError: the model cannot be simulated, there are results of other settings, or the
-            cluster cannot be reached.
+        SettingError: the name of the output is that of another kind of table, or there are results
+            of other settings.
+        OsimliteError: the model cannot be simulated, or the cluster cannot be reached.
     """
     path = Path(output)
     started = time.perf_counter()

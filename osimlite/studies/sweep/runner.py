@@ -157,7 +157,11 @@ class Runner:
         self._report_times = np.array(moments)
 
     def run(self, values: Floats) -> Block:
-        """Run samples (k, d); a run that fails is reported in the block and raises nothing."""
+        """Run samples (k, d).
+
+        Returns:
+            Results of the samples. A run that fails is reported there, and raises nothing.
+        """
         started = time.perf_counter()
         count = len(values)
         block = Block(
@@ -257,7 +261,11 @@ class Runner:
     def _simulate_batch(
         self, engine: Any, observers: _Observers, variants: Sequence[Variant], starts: Floats
     ) -> tuple[Runs, Endings]:
-        """Simulate a batch of models of one structure from their initial states (W, y)."""
+        """Simulate a batch of models of one structure from their initial states (W, y).
+
+        Returns:
+            Results of the runs; and for each run its status, with the reason or None.
+        """
         if self.plan.engine != "compiled":
             return self._simulate_one_by_one(engine, variants, starts)
         from osimlite.simulation.batches import ENDINGS, run_many
@@ -338,7 +346,11 @@ class Runner:
     def _simulate_one_by_one(
         self, engine: Any, variants: Sequence[Variant], starts: Floats
     ) -> tuple[Runs, Endings]:
-        """Run samples with an engine that simulates one motion at a time."""
+        """Run samples with an engine that simulates one motion at a time.
+
+        Returns:
+            Results of the runs; and for each run its status, with the reason or None.
+        """
         plan = self.plan
         endings: Endings = []
         order, contacts = engine.order, engine.contacts

@@ -107,7 +107,7 @@ def choose_samples(
     count: int | None = None,
     seed: int = 0,
 ) -> Samples:
-    """Choose the samples of a sweep.
+    """Return the samples of a sweep.
 
     Args:
         variables: variables.

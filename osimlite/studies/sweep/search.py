@@ -52,13 +52,16 @@ class Search(NamedTuple):
 
 
 def run_cma(compute_costs: CostFunction, search: Search, *, keeps_best: bool = False) -> str:
-    """Minimize with covariance matrix adaptation (CMA-ES, Hansen's pycma); return why it ended.
+    """Minimize with covariance matrix adaptation (CMA-ES, Hansen's pycma).
 
     Args:
         compute_costs: cost function.
         search: settings.
         keeps_best: whether the first population contains the first point, and each later one the
             best point so far as a parent.
+
+    Returns:
+        Reason for the end of the search, as text.
     """
     strategy = require("cma", extra="optimize", purpose="the search by cma")
     _require_two_variables(search)
@@ -92,8 +95,6 @@ def run_cma(compute_costs: CostFunction, search: Search, *, keeps_best: bool = F
 def run_sobol_cma(compute_costs: CostFunction, search: Search) -> str:
     """Run CMA-ES from the best of two populations of Sobol points and the start.
 
-    The function returns why it ended.
-
     With a small budget and a cost of many valleys, as that of a walker, this gets farther than
     CMA-ES from the start alone, and never ends worse than it began. With thousands of evaluations
     CMA-ES alone may get farther. The number of Sobol points does not depend on the budget, so that
@@ -102,6 +103,9 @@ def run_sobol_cma(compute_costs: CostFunction, search: Search) -> str:
     Args:
         compute_costs: cost function.
         search: settings.
+
+    Returns:
+        Reason for the end of the search, as text.
     """
     _require_two_variables(search)
     # The default size of a population in CMA-ES.
@@ -117,11 +121,14 @@ def run_sobol_cma(compute_costs: CostFunction, search: Search) -> str:
 
 
 def run_differential_evolution(compute_costs: CostFunction, search: Search) -> str:
-    """Minimize with differential evolution (scipy); return why it ended.
+    """Minimize with differential evolution (scipy).
 
     Args:
         compute_costs: cost function.
         search: settings.
+
+    Returns:
+        Reason for the end of the search, as text.
 
     Raises:
         SettingError: the search is not bounded.
@@ -157,13 +164,16 @@ def run_differential_evolution(compute_costs: CostFunction, search: Search) -> s
 
 
 def run_nelder_mead(compute_costs: CostFunction, search: Search) -> str:
-    """Minimize with the simplex method of Nelder and Mead (scipy); return why it ended.
+    """Minimize with the simplex method of Nelder and Mead (scipy).
 
     It evaluates one point at a time.
 
     Args:
         compute_costs: cost function.
         search: settings.
+
+    Returns:
+        Reason for the end of the search, as text.
     """
     optimize = require("scipy.optimize", extra="sweep", purpose="the search by Nelder and Mead")
     size = len(search.start)
@@ -192,13 +202,16 @@ def run_nelder_mead(compute_costs: CostFunction, search: Search) -> str:
 
 
 def run_lbfgs(compute_costs: CostFunction, search: Search) -> str:
-    """Minimize with L-BFGS-B (scipy) and exact gradients, one point at a time; return why it ended.
+    """Minimize with L-BFGS-B (scipy) and exact gradients, one point at a time.
 
     It finds a local minimum, which may be far from the global one.
 
     Args:
         compute_costs: cost function.
         search: settings with a gradient.
+
+    Returns:
+        Reason for the end of the search, as text.
     """
     optimize = require("scipy.optimize", extra="sweep", purpose="the search by gradients")
     tolerance = 1e-9 if search.tolerance is None else search.tolerance
@@ -240,7 +253,11 @@ def find_method(name: str) -> Callable[[CostFunction, Search], str]:
 
 
 def _require_two_variables(search: Search) -> None:
-    """Refuse a single variable, whose covariance matrix CMA-ES cannot adapt."""
+    """Refuse a single variable, whose covariance matrix CMA-ES cannot adapt.
+
+    Raises:
+        SettingError: the search has fewer than two variables.
+    """
     if len(search.start) < 2:
         raise SettingError(
             "the method 'cma' needs at least two variables; use the method 'nelder-mead' for one variable"
