@@ -141,7 +141,11 @@ def expand_nodes(name: str) -> list[str]:
 
 
 def _parse_time(name: str, text: str) -> float:
-    """Return the time (s) behind the @ of a name."""
+    """Return the time (s) behind the @ of a name.
+
+    Raises:
+        SettingError: the text is not a finite number of at least 0.
+    """
     try:
         time = float(text)
     except ValueError:
@@ -313,7 +317,11 @@ class VariedControls:
         return function
 
     def _add_multiplier(self, model: Model, actuator: str, index: int) -> None:
-        """Replace the functions of a control by multiples of them."""
+        """Replace the functions of a control by multiples of them.
+
+        Raises:
+            SettingError: no PrescribedController sets the control by a function.
+        """
         count_before = len(self._puts)
         for controller in model.components(PrescribedController):
             functions = controller.ControlFunctions.objects

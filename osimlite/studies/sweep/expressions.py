@@ -142,13 +142,22 @@ class ExpressionMeasure:
         )
 
     def _evaluate_columns(self, times: Floats, columns: Sequence[Floats]) -> Any:
-        """Evaluate the expression from the histories (t,) of its quantities."""
+        """Return the value of the expression for histories (t,) of its quantities.
+
+        Returns:
+            A number, or a history (t,) if the expression does not reduce its quantities to a
+            number.
+        """
         # A division by zero gives NaN or infinity, which counts as a run without a result.
         with np.errstate(all="ignore"):
             return self._evaluate_node(self._tree, times, columns)
 
     def _evaluate_node(self, node: ast.AST, times: Floats, columns: Sequence[Floats]) -> Any:
-        """Evaluate a part of the expression: a number, or a history (t,)."""
+        """Return the value of a part of the expression: a number, or a history (t,).
+
+        Raises:
+            SettingError: an operator, a function or another part is not allowed in expressions.
+        """
 
         def evaluate(child: ast.AST) -> Any:
             return self._evaluate_node(child, times, columns)

@@ -51,7 +51,11 @@ class _UnknownEvents(list[Any]):
     """Events of a neighbouring run, which is not simulated: any access is an error."""
 
     def _refuse(self, *_: object) -> NoReturn:
-        """Raise an error for a measure that asks for events."""
+        """Refuse access to the events of a run.
+
+        Raises:
+            UnsupportedError: always, because events have no derivatives.
+        """
         raise UnsupportedError(
             "events of a run have no derivatives; choose another measure, or another method"
         )
@@ -109,7 +113,9 @@ class Gradients:
             free_indices: indices of the variables (f,).
 
         Raises:
-            OsimliteError: there is no run with these values, or it has no derivatives.
+            UnsupportedError: models with other values have other equations.
+            SimulationError: the measure has no derivative with respect to a variable.
+            OsimliteError: there is no run with these values.
         """
         center = self._make_neighbour(list(values))
         sizes = [
@@ -205,7 +211,7 @@ class Gradients:
         )
 
     def _simulate_neighbour(self, neighbour: _Neighbour) -> Runs:
-        """Simulate one model from its initial state."""
+        """Return the run of one model from its initial state."""
         plan = self._plan
         return run_many(
             neighbour.variant.engine,

@@ -224,7 +224,7 @@ def get_measure_name(spec: Any) -> str:
 
 @registry.register_measure(is_maximized=True)
 def distance(engine: Any, feet: Sequence[str] | None = None) -> RunMeasure:
-    """Make the measure `distance`: displacement along the first free translational coordinate (m).
+    """Return the measure `distance`: displacement of the first free translational coordinate (m).
 
     Args:
         engine: engine of the model.
@@ -254,7 +254,7 @@ def distance(engine: Any, feet: Sequence[str] | None = None) -> RunMeasure:
 
 @registry.register_measure()
 def largest_force(engine: Any, feet: Sequence[str] | None = None) -> RunMeasure:
-    """Make the measure `largest_force`: largest force of any contact at the ends of steps (N).
+    """Return the measure `largest_force`: largest force of any contact at the ends of steps (N).
 
     Args:
         engine: engine of the model.
@@ -269,7 +269,7 @@ def largest_force(engine: Any, feet: Sequence[str] | None = None) -> RunMeasure:
 
 @registry.register_measure()
 def energy(engine: Any, feet: Sequence[str] | None = None) -> RunMeasure:
-    """Make the measure `energy`: change of mechanical energy (J); contact and damping reduce it.
+    """Return the measure `energy`: change of mechanical energy (J); contact and damping reduce it.
 
     Args:
         engine: engine of the model.
@@ -372,7 +372,11 @@ def _find_state(engine: Any, name: str) -> tuple[int | None, float]:
 
 
 def _import_function(name: str) -> Callable[[Run], float]:
-    """Return the function that `module:function` or `file.py:function` names."""
+    """Return the function that `module:function` or `file.py:function` names.
+
+    Raises:
+        SettingError: the module has no function of this name.
+    """
     module_name, _, function = name.rpartition(":")
     module = (
         run_python_file(Path(module_name))

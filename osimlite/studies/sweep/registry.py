@@ -62,7 +62,11 @@ def register_measure(*, is_maximized: bool = False) -> Callable[[F], F]:
 
 
 def register_start(make: F) -> F:
-    """Register a function that makes a start, under its name."""
+    """Register a function that makes a start, under its name.
+
+    Returns:
+        The same function.
+    """
     _STARTS[make.__name__] = make
     return make
 
@@ -96,7 +100,7 @@ def list_measure_names() -> list[str]:
 
 
 def _load_provider(table: dict[str, T], name: str) -> T | None:
-    """Import modules until one of them registers a name; return its entry, or None."""
+    """Return the entry of a name, or None; import modules until one of them registers the name."""
     for module in PROVIDERS:
         import_module(module)
         if name in table:

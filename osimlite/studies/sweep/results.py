@@ -231,7 +231,11 @@ class PartialTable:
             ) from None
 
     def add(self, columns: Sequence[Any]) -> None:
-        """Add rows, given as columns in the order of the schema."""
+        """Add rows, given as columns in the order of the schema.
+
+        Raises:
+            OsimliteError: the file cannot be written, for example because the disk is full.
+        """
         pa = _load_arrow()
         arrays = [
             pa.array(column, field.type, from_pandas=False)
@@ -272,6 +276,12 @@ class PartialTable:
         """Convert the rows to the Parquet file, which replaces an older one in one step.
 
         Without rows nothing is written.
+
+        Returns:
+            Path of the Parquet file, also if nothing is written.
+
+        Raises:
+            OsimliteError: the Parquet file cannot be written.
         """
         if self.rows == 0:
             return self.path
@@ -331,7 +341,12 @@ class PartialTable:
             self._lock.release()
 
     def _reopen_file(self) -> None:
-        """Check the settings, count the rows, and cut off damaged records."""
+        """Check the settings, count the rows, and cut off damaged records.
+
+        Raises:
+            SettingError: the file is not an interrupted sweep, its beginning is damaged, or it has
+                other settings or columns.
+        """
         pa = _load_arrow()
         first_record = next(_read_records(self.partial), None)
         try:
@@ -369,6 +384,10 @@ class PartialTable:
 
 def _lock_file(path: Path) -> Any:
     """Lock a file against other programs until the lock is released.
+
+    Returns:
+        Lock of the library filelock, which the caller releases. Where the file system supports no
+        locks, it locks nothing.
 
     Raises:
         OsimliteError: another program has locked it, or the folder does not exist.
@@ -413,7 +432,11 @@ def _compute_checksum(body: bytes) -> bytes:
 
 
 def _read_batches(path: Path, process_batch: Callable[[Any], object]) -> int:
-    """Call a function with each intact batch, and return the offset after the last one."""
+    """Call a function with each intact batch.
+
+    Returns:
+        Offset in the file after the last intact batch (bytes).
+    """
     pa = _load_arrow()
     records = _read_records(path)
     schema_record, end = next(records)
@@ -469,7 +492,11 @@ class ResultTable:
 
 @contextmanager
 def report_damage(path: str | Path) -> Iterator[None]:
-    """Return a context that turns errors of reading Parquet into one that names the file."""
+    """Return a context that turns errors of reading Parquet into one that names the file.
+
+    Raises:
+        OsimliteError: the code in the context raises an OSError or a ValueError.
+    """
     try:
         yield
     except (OSError, ValueError):

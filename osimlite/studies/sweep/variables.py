@@ -376,7 +376,12 @@ def _describe_unknown_name(
 def _list_coordinates(
     name: str, infos: Sequence[CoordinateInfo], is_speed: bool, model: Model
 ) -> tuple[Target, str]:
-    """Return the target of coordinates and its unit; locked ones are varied by their default value."""
+    """Return the target of coordinates and its unit; locked ones are varied by their default value.
+
+    Raises:
+        SettingError: a locked coordinate has no speed, or some coordinates are locked and others
+            are not.
+    """
     unit = infos[0].unit or "rad | m"
     locked = [info for info in infos if info.locked]
     if locked and is_speed:
@@ -404,6 +409,10 @@ def _make_variable(name: str, target: Target, unit: str, value_range: Range) -> 
         target: number that the variable changes.
         unit: unit of the number.
         value_range: range as the user wrote it.
+
+    Raises:
+        SettingError: the range is malformed or descends, its unit does not fit, its number of
+            values does not fit its ends, or a logarithmic range is not above 0.
     """
     fields = (
         value_range.split(":")
@@ -454,7 +463,12 @@ def _make_variable(name: str, target: Target, unit: str, value_range: Range) -> 
 
 
 def _refuse_mixed_units(name: str, bound_texts: Sequence[object], unit: str) -> None:
-    """Refuse a range such as `20deg:40` in rad; 0 needs no unit."""
+    """Refuse a range such as `20deg:40` in rad; 0 needs no unit.
+
+    Raises:
+        SettingError: only one end of the range has a unit, which is not that of the variable, and
+            the other end is not 0.
+    """
     quantities = [parse_quantity(str(bound_text)) for bound_text in bound_texts]
     with_unit = [
         quantity.unit
@@ -492,7 +506,11 @@ def _describe_suspect_range(variable: Variable, value_range: Range, mechanism: M
 
 
 def _parse_number(name: str, number_or_text: object, unit: str) -> float:
-    """Return a number in the unit of the variable; `30deg` is converted."""
+    """Return a number in the unit of the variable; `30deg` is converted.
+
+    Raises:
+        SettingError: the text is not a finite number, or its unit does not fit the variable.
+    """
     if isinstance(number_or_text, int | float):
         quantity: Quantity | None = Quantity(float(number_or_text), None)
     else:

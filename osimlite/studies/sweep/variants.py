@@ -154,7 +154,8 @@ class Variants:
             values: values of all variables.
 
         Raises:
-            OsimliteError: a coordinate is unknown or locked, or a muscle has no equilibrium.
+            SettingError: a coordinate is locked.
+            OsimliteError: a coordinate is unknown, or a muscle has no equilibrium.
         """
         # A new engine is made only if the structure, and so the coordinates, may differ.
         engine = (
@@ -398,14 +399,14 @@ class Variants:
         )
 
     def _add_controls(self, variant: Variant) -> Variant:
-        """Compile the controller for a variant."""
+        """Return a variant after compiling the controller for it, if there is one."""
         if self._controller is not None:
             variant.controller = self._controller
             variant.kernel_controller = self._controller.compile_for(self.model, variant.engine)
         return variant
 
     def _make_variant(self, values: Sequence[float]) -> Variant:
-        """Make the model of a sample, by an update if possible."""
+        """Return the model of a sample, by an update of the engine if possible."""
         self.apply_sample(values)
         base_variant = self.base_variant
         # Gains change the controller only; the engine stays.
