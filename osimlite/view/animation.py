@@ -84,6 +84,9 @@ def animate(
             :class:`osimlite.simulation.Options`.
         progress: called with the number of frames done and of all frames.
 
+    Returns:
+        Path of the file.
+
     Raises:
         MissingDependency: pillow is not installed.
         OsimliteError: the motion has no moments, or an argument is out of range.
@@ -169,7 +172,7 @@ class Film:
         self.reach = self._compute_reach()
 
     def project_points(self, points: Array) -> Array:
-        """Project points (k, 3) in ground onto the picture plane (k, 2), m."""
+        """Return the projections (k, 2) of points (k, 3) in ground onto the picture plane, m."""
         return np.column_stack((points @ self.right, points @ self.up))
 
     def _compute_focus(self) -> Array:
@@ -253,7 +256,7 @@ class _Painter:
         )
 
     def draw_frame(self, number: int) -> Any:
-        """Draw frame `number` as a pillow image."""
+        """Return a drawing of frame `number` as a pillow image."""
         film = self.film
         pose = self.film.poses[number]
         camera = Camera(film.right, film.up, film.focus[number], self.half)

@@ -85,7 +85,11 @@ def read_bands(path: str | Path) -> dict[str, Band]:
 
 
 def _to_number(cell: str, file: str) -> float:
-    """Return the number in a cell."""
+    """Return the number in a cell.
+
+    Raises:
+        DocumentError: the cell does not contain a number.
+    """
     try:
         return float(cell)
     except ValueError:

@@ -182,6 +182,9 @@ class _Spans(NamedTuple):
             corners: values at the corners of all triangles (t, 3, ...).
             span_indices: index of the span of each pixel (k,).
             steps: offset of each pixel in its span (k,).
+
+        Returns:
+            Values at the pixels (k, ...).
         """
         span_corners = corners[self.triangles]
         first, change = (

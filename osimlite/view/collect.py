@@ -96,7 +96,7 @@ MAX_RADIUS_M = 0.025
 def build_scene(
     model: Model, mechanism: Mechanism, folders: MeshFolders | None = None, wrapping: str = OPENSIM
 ) -> Scene:
-    """Build the scene of a model; each component that cannot be drawn becomes a remark.
+    """Return the scene of a model; each component that cannot be drawn becomes a remark.
 
     Args:
         model: model to draw.
@@ -199,7 +199,12 @@ class _SceneCollector:
                 self.axes.append(Axes(path, *self.mechanism.frames[path]))
 
     def _add_geometry(self, shape: geometry.Geometry, path: str) -> None:
-        """Add a mesh, analytical shape or line that is attached to a frame, in its own colour."""
+        """Add a mesh, analytical shape or line that is attached to a frame, in its own colour.
+
+        Raises:
+            UnsupportedError: the shape is in a frame that is not fixed to a body, or is not
+                supported.
+        """
         frame = frame_of(self.tree, shape)
         if frame is None or frame not in self.mechanism.frames:
             raise UnsupportedError("is in a frame that is not fixed to a body")
@@ -247,7 +252,12 @@ class _SceneCollector:
         )
 
     def _add_wrap_object(self, surface: wrapping.WrapObject, path: str) -> None:
-        """Add the translucent surface of a wrap object."""
+        """Add the translucent surface of a wrap object.
+
+        Raises:
+            UnsupportedError: the wrap object is not attached to a frame, or its shape is not
+                supported.
+        """
         # A wrap object belongs to a set of its body.
         frame = self.tree.parent_of(surface)
         while frame is not None and not isinstance(frame, PhysicalFrame):
@@ -275,7 +285,12 @@ class _SceneCollector:
         )
 
     def _make_shape(self, shape: Component) -> tuple[Surface, Array]:
-        """Return a unit shape, and the matrix (4, 4) that scales it to the shape."""
+        """Return a unit shape, and the matrix (4, 4) that scales it to the shape.
+
+        Raises:
+            UnsupportedError: osimlite does not draw shapes of this class, or the radius of a torus
+                is not positive.
+        """
         match shape:
             case geometry_types.Brick():
                 return unit_shapes.make_cube(), _make_stretch(2.0 * np.array(shape.half_lengths))
@@ -488,7 +503,11 @@ class _SceneCollector:
         self.lines.append(Line(path, layer, points, color, 0.003, visible))
 
     def _read_mesh(self, name: str) -> Surface:
-        """Return the mesh in a file; one object for each file."""
+        """Return the mesh in a file; one object for each file.
+
+        Raises:
+            ModelError: no folder has the mesh file.
+        """
         result = self.folders.find(name)
         if result is None:
             raise ModelError(
@@ -510,7 +529,11 @@ class _SceneCollector:
         return self.mechanism.coordinate_index(self.tree.path_of(result) or "")
 
     def _widen_half_spaces(self, scene: Scene) -> Scene:
-        """Scale the half spaces of a scene to the size of the model, in place, and return the scene."""
+        """Scale the half spaces of a scene to the size of the model, in place.
+
+        Returns:
+            The same scene.
+        """
         if self.half_spaces:
             lowest, highest = scene.compute_box(scene.mechanism.values({}))
             width = max(1.0, WIDTH_OF_HALF_SPACE * float(np.linalg.norm(highest - lowest)))

@@ -42,6 +42,9 @@ def write_glb(scene: Scene, q: Array, motion: DrawableMotion | None, path: str |
         q: coordinate values (n,), the pose of a model without motion; not used with a motion.
         motion: motion of the model; None for a still scene.
         path: file to write.
+
+    Returns:
+        Path of the file.
     """
     times = np.zeros(1)
     rows = q[None, :]
@@ -262,7 +265,11 @@ class _GlbWriter:
         return self._add_unique(key, self.meshes, {"primitives": [primitive]})
 
     def add_node(self, name: str, track: _Track, mesh: int | None = None) -> int:
-        """Add a node in ground, animated unless its track is constant; return its index."""
+        """Add a node in ground, animated unless its track is constant.
+
+        Returns:
+            Index of the node.
+        """
         index = len(self.nodes)
         node: dict[str, Any] = {"name": name} | ({} if mesh is None else {"mesh": mesh})
         for property_name, values in track._asdict().items():

@@ -33,10 +33,15 @@ class ShowableModel(NamedTuple):
 
 
 def build_showable(model: Model) -> ShowableModel:
-    """Build the mechanism of a model, or of a copy without the joints and constraints that cannot be built.
+    """Build the mechanism of a model without the joints and constraints that cannot be built.
 
-    A body that loses its joint this way moves freely, as OpenSim's bodies without a joint do; it is
-    shown at ground.
+    These parts are removed from a copy, so that the model of the caller stays complete. A body that
+    loses its joint this way moves freely, as OpenSim's bodies without a joint do; it is shown at
+    ground.
+
+    Returns:
+        Model without the parts that cannot be built, its mechanism, and paths and reasons of these
+        parts.
 
     Raises:
         ModelError: the model is invalid, and no single part of it is the cause.
@@ -62,7 +67,11 @@ def build_showable(model: Model) -> ShowableModel:
 
 
 def _take_out(model: Model, message: str) -> str | None:
-    """Remove the first member of a set that a message names; return its path, or None if none is named."""
+    """Remove the first member of a set that a message names.
+
+    Returns:
+        Path of the removed member; None if the message names none.
+    """
     tree = model.tree()
     for path in _QUOTED_PATH.findall(message):
         # '/jointset/hip/hip_offset' is part of the joint '/jointset/hip', which is of no use
@@ -75,7 +84,11 @@ def _take_out(model: Model, message: str) -> str | None:
 
 
 def _remove_component(model: Model, component: Component) -> bool:
-    """Remove a component from the list that holds it; return False if no list does."""
+    """Remove a component from the list that holds it.
+
+    Returns:
+        Whether a list holds it.
+    """
     for owner in model.walk():
         for spec, member in owner.list_owned_objects():
             siblings = getattr(owner, spec.name)

@@ -109,6 +109,9 @@ class ModelView:
             left_out: paths of the parts that the caller has removed from `model` because they
                 cannot be built, with the reasons.
 
+        Returns:
+            View of the model, with its motion and remarks.
+
         Raises:
             OsimliteError: a file is missing or has the wrong contents; no pose satisfies the
                 constraints.
@@ -153,11 +156,18 @@ class ModelView:
         return Path(path)
 
     def write_glb(self, path: str | Path) -> Path:
-        """Write a glTF 2.0 file (.glb) with the model and its motion, and return its path."""
+        """Write a glTF 2.0 file (.glb) with the model and its motion.
+
+        Returns:
+            Path of the file.
+        """
         return write_glb(self.scene, self.q, self.motion, path)
 
     def write_rrd(self, path: str | Path) -> Path:
-        """Write a recording for Rerun (.rrd) with the model and its motion, and return its path.
+        """Write a recording for Rerun (.rrd) with the model and its motion.
+
+        Returns:
+            Path of the file.
 
         Raises:
             MissingDependency: rerun-sdk is not installed.
@@ -222,6 +232,9 @@ class ModelView:
         Returns:
             Coordinate values (n,), force arrows, paths of the surfaces under load, and colours of
             muscles by path.
+
+        Raises:
+            OsimliteError: a time is given without a motion, or lies outside of the motion.
         """
         motion = self.motion
         if motion is None:

@@ -119,7 +119,11 @@ def find_moving_bodies(poses: Sequence[Bodies]) -> Array:
 
 
 def interpolate_columns(motion: DrawableMotion, columns: Array, times: Array) -> Array:
-    """Interpolate columns (n, k) of the motion linearly at other times (m,)."""
+    """Interpolate columns (n, k) of the motion linearly at other times (m,).
+
+    Returns:
+        Columns at these times (m, k).
+    """
     recorded = np.asarray(motion.times, dtype=float)
     rows = [np.interp(times, recorded, columns[:, k]) for k in range(columns.shape[1])]
     return np.array(rows).reshape(len(rows), len(times)).T

@@ -136,7 +136,7 @@ def _mirror(name: str) -> str:
 
 
 def _trim(name: str) -> str:
-    """Remove the separators that remain when a side is cut out of a name."""
+    """Return a name without the separators that remain when a side is cut out of it."""
     return re.sub(r"(?<=[._/ ])[._ ]+|^[._/ ]|[._/ ]$", "", name)
 
 
@@ -244,7 +244,7 @@ def _describe_constants(descriptions: Sequence[str]) -> str:
 
 
 def merge_panels(panels: Iterable[Panel]) -> list[Panel]:
-    """Put the curves of panels with the same title and unit into one panel."""
+    """Return panels in which those with the same title and unit are one panel."""
     result: dict[tuple[str, str], Panel] = {}
     for panel in panels:
         merged = result.setdefault((panel.title, panel.unit), panel._replace(curves=[]))

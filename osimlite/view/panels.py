@@ -193,7 +193,7 @@ def _fill_rows(groups: Iterable[Sequence[Panel]], width: int) -> list[list[Panel
 
 
 def _draw_page(page: Page) -> Any:
-    """Draw the rows of one page."""
+    """Return a figure with the rows of one page."""
     columns = max(len(row) for row in page.rows)
     # A page of one panel has room for its title.
     panel_width = PANEL_WIDTH_IN if columns > 1 else 1.5 * PANEL_WIDTH_IN

@@ -131,7 +131,7 @@ def draw_scene(
     arrows: Sequence[ForceArrow] = (),
     style: Style | None = None,
 ) -> Any:
-    """Draw a scene in a pose as a pillow image.
+    """Return a drawing of a scene in a pose as a pillow image.
 
     Args:
         scene: scene to draw.

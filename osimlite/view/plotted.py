@@ -100,6 +100,10 @@ def _plot_columns(table: StoTable, names: ColumnNames) -> Pages:
 
 
 def _require_times(count: int) -> None:
-    """Raise an error if a motion or table has no rows."""
+    """Raise an error if a motion or table has no rows.
+
+    Raises:
+        OsimliteError: there are no rows.
+    """
     if not count:
         raise OsimliteError("the motion has no rows; nothing can be drawn")

@@ -66,9 +66,12 @@ def read_recording(
         mechanism: mechanism of `model`.
         path: motion file (.sto or .mot).
         forces: file with forces; None to compute them.
-        values: constant values (rad, m) by the names or paths of coordinates, which replace those in
-            the file.
+        values: constant values (rad, m) by the names or paths of coordinates, which replace those
+            in the file.
         folder: folder of the model's file, where the files of contact meshes are searched.
+
+    Returns:
+        Motion with its speeds, forces and activations, and remarks about missing data.
 
     Raises:
         OsimliteError: a file is missing or is not a motion; see :meth:`.RecordedMotion.read`.

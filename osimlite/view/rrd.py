@@ -30,6 +30,9 @@ def write_rrd(scene: Scene, q: Array, motion: DrawableMotion | None, path: str |
         motion: motion of the model; None for a still scene.
         path: file to write.
 
+    Returns:
+        Path of the file.
+
     Raises:
         MissingDependency: rerun-sdk is not installed.
         OsimliteError: the file cannot be written.

@@ -135,7 +135,7 @@ class Bodies:
         ]
 
     def transform_points(self, body: int, points: Array) -> Array:
-        """Transform points (k, 3) from a body's frame to ground, m."""
+        """Return the positions (k, 3) in ground, m, of points (k, 3) in a body's frame."""
         return cast("Array", points @ self.rotations[body].T + self.origins[body])
 
     def transform_frame(self, body: int, transform: Array) -> Array:
@@ -199,7 +199,7 @@ class Scene:
         return -gravity / size if size > 0.0 else np.array((0.0, 1.0, 0.0))
 
     def iterate_visible_items(self) -> Iterator[Item]:
-        """Yield the items that the model and its layers show."""
+        """Return an iterator over the items that the model and its layers show."""
         return (
             drawn_item
             for drawn_item in self.items

@@ -120,7 +120,11 @@ def _make_handler(
             self._respond(status, json.dumps(result).encode(), "application/json")
 
         def _read_request(self) -> bytes:
-            """Return the body of a request for a pose."""
+            """Return the body of a request for a pose.
+
+            Raises:
+                _BadRequest: the request is not for a pose, has no valid length, or is too long.
+            """
             if not self._is_for_us() or self.path != "/assemble":
                 raise _BadRequest(HTTPStatus.FORBIDDEN, "this server answers its own page only")
             length = self.headers.get("Content-Length", "")

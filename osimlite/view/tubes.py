@@ -82,10 +82,10 @@ def lay_tube(
     growth: float,
     rings: Floats,
 ) -> int:
-    """Write the rings of a tube along a line, and return their number.
+    """Write the rings of a tube along a line.
 
-    Half of the tendon is at each end, at most `LONGEST_TENDON` of the length. The radius of the fibers
-    between them grows from `thin` to `thick` in the middle.
+    Half of the tendon is at each end, at most `LONGEST_TENDON` of the length. The radius of the
+    fibers between them grows from `thin` to `thick` in the middle.
 
     Args:
         corners: corners of the line in ground (3 each), m.
@@ -95,6 +95,9 @@ def lay_tube(
         tendon: tendon slack length, m.
         growth: factor of all radii.
         rings: filled with `RING` records, at most `corner_count` + `MORE_RINGS`.
+
+    Returns:
+        Number of rings that were written.
     """
     if corner_count == 0:
         return 0
@@ -115,7 +118,11 @@ def _write_rings(
     growth: float,
     rings: Floats,
 ) -> int:
-    """Write centres, radii and parts of rings except the ends; return the index after the last."""
+    """Write centres, radii and parts of rings except the ends.
+
+    Returns:
+        Index after the last ring.
+    """
     length = 0.0
     for k in range(1, corner_count):
         length += norm(minus(vector(corners, 3 * k), vector(corners, 3 * k - 3)))
@@ -172,7 +179,11 @@ def measure_radius(distance: float, start: float, stop: float, thin: float, thic
 
 
 def _add_ring(rings: Floats, ring: int, center: Vector, radius: float, fibers: float) -> int:
-    """Write centre, radius and part of a ring, and return the index of the next."""
+    """Write centre, radius and part of a ring.
+
+    Returns:
+        Index of the next ring.
+    """
     offset = ring * RING.SIZE
     store_vector(rings, offset + RING.CENTER, center)
     rings[offset + RING.RADIUS] = radius
