@@ -67,11 +67,11 @@ class Basin:
 def sample_perturbed_starts(
     step_map: StepMap, state: ArrayLike, max_change: float, count: int, seed: int
 ) -> Floats:
-    """Draw random initial states (count, y) near a state.
+    """Return random initial states (count, y) near a state.
 
-    Each value and speed is multiplied by a uniform random number between 1 - `max_change` and 1 + `max_change`,
-    except along neutral directions. Then the walker is lifted or lowered until the penetration of
-    the stance foot is as before.
+    Each value and speed is multiplied by a uniform random number between 1 - `max_change` and
+    1 + `max_change`, except along neutral directions. Then the walker is lifted or lowered until
+    the penetration of the stance foot is as before.
 
     Args:
         step_map: step map of the walker.
@@ -160,6 +160,9 @@ def find_basin(
         accuracy: accuracy of the integrator.
         progress: callback after each part of the walkers.
 
+    Returns:
+        Number of steps from each initial state of the grid.
+
     Raises:
         OsimliteError: a coordinate is unknown or locked, or the legs are not alike, so that there
             are no defaults.
@@ -200,7 +203,11 @@ def find_basin(
 
 
 def _find_leg_speeds(step_map: StepMap) -> tuple[int, int]:
-    """Return the offsets in the state of the speeds of the first joints of the two legs."""
+    """Return the offsets in the state of the speeds of the first joints of the two legs.
+
+    Raises:
+        OsimliteError: the legs are not alike.
+    """
     dof_count = len(step_map.engine.order)
     if step_map.exchange is None:
         raise OsimliteError(
@@ -237,7 +244,11 @@ def find_basin_offsets(
 
 
 def _find_index(engine: BatchEngine, name: str) -> int:
-    """Return the index in the state of a coordinate, or of its speed (`NAME/speed`)."""
+    """Return the index in the state of a coordinate, or of its speed (`NAME/speed`).
+
+    Raises:
+        SettingError: the coordinate does not exist, or is locked.
+    """
     coordinate, slash, quantity = name.rpartition("/")
     is_speed = bool(slash) and quantity == "speed"
     try:

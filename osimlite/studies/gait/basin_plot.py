@@ -32,7 +32,11 @@ def draw_basin(basin: Basin, path: str | Path, *, title: str = "Steps before the
 
 
 def _draw_panels(basin: Basin, path: Path, title: str) -> Path:
-    """Draw the numbers of steps over the initial states, and return the path of the file."""
+    """Draw the numbers of steps over the initial states.
+
+    Returns:
+        Path of the PNG file.
+    """
     figure = make_figure("", (6.4, 5.2))
     axes = figure.subplots()
     half_pixel = [float(axis.values[1] - axis.values[0]) / 2.0 for axis in (basin.x, basin.y)]

@@ -101,7 +101,7 @@ def find_cycle(
     max_steps: int = MAX_NEWTON_STEPS,
     warm_up_steps: int = 0,
 ) -> Cycle:
-    """Find a fixed point of the step map by Newton's method with a line search.
+    """Return a fixed point of the step map, found by Newton's method with a line search.
 
     Args:
         step_map: step map of the walker.

@@ -278,7 +278,7 @@ class CycleSearch:
     def find_candidates(
         self, count: int, seed: int, progress: Progress | None = None
     ) -> list[Candidate]:
-        """Simulate random walkers, and return those that make two steps, the best first.
+        """Simulate random walkers, and select those that make two steps.
 
         A walker with a scuff between the two steps is no candidate.
 
@@ -286,6 +286,9 @@ class CycleSearch:
             count: number of random walkers.
             seed: seed of the random numbers.
             progress: callback after each part of the walkers.
+
+        Returns:
+            Walkers that make two steps, those with the most similar steps first.
         """
         rng = np.random.default_rng(seed)
         result = []
@@ -297,7 +300,11 @@ class CycleSearch:
         return sorted(result, key=lambda candidate: candidate.miss)
 
     def _draw_samples(self, rng: np.random.Generator, count: int) -> list[Candidate]:
-        """Simulate random walkers in one call, and return those that make two steps."""
+        """Simulate random walkers in one call, and select those that make two steps.
+
+        Returns:
+            Walkers that make two steps, in the order of the samples.
+        """
         engine: Any = self.variants.base_variant.engine
         models = rng.random((-(-count // STARTS_PER_MODEL), len(self._numbers)))
         starts = rng.random((count, len(self._starts)))
@@ -437,7 +444,7 @@ class CycleSearch:
             return None
 
     def find_cycle(self, fractions: Floats, state: Floats, *, fine: bool = False) -> ModelCycle:
-        """Find the cycle of the model with given numbers that is near a state.
+        """Return the cycle of the model with given numbers that is near a state.
 
         Args:
             fractions: fractions of the numbers (k,).
@@ -556,6 +563,10 @@ class _ClosingProblem:
         """Stop the solver near a cycle, or where the residual no longer decreases.
 
         Near a cycle Newton's method takes over.
+
+        Raises:
+            StopIteration: the residual is small, or no longer decreases; scipy then stops the
+                solver.
         """
         self._sizes.append(float(np.linalg.norm(intermediate_result.fun)))
         present_size = self._sizes[-1]

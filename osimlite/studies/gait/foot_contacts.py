@@ -57,7 +57,7 @@ class _SoleContact:
 
 
 def find_footing(engine: BatchEngine, feet: Sequence[str] | None = None) -> FootContacts:
-    """Decide which contacts with the ground are feet, and which are falls.
+    """Return which contacts with the ground are feet, and which end a walk.
 
     Bodies that touch the ground and carry no other such body are the ends of the legs. On each, the
     contact farthest from the joint belongs to the foot, and so do others that are at least half as
@@ -111,7 +111,12 @@ def find_footing(engine: BatchEngine, feet: Sequence[str] | None = None) -> Foot
 
 
 def _find_feet(mechanism: Mechanism, soles: Sequence[_SoleContact]) -> tuple[tuple[str, ...], ...]:
-    """Return the contacts of the feet from the structure of the model and the names of the contacts."""
+    """Return the contacts of the feet from the structure of the model and the contacts' names.
+
+    Raises:
+        OsimliteError: no sphere of the model touches a half space, or the model does not have two
+            legs.
+    """
     bodies = {sole.body for sole in soles}
     ancestors_by_body = {body: set(_list_ancestors(mechanism, body)) for body in bodies}
     end_bodies = sorted(

@@ -231,6 +231,9 @@ def close_candidates(
         enough: number of cycles after which no more are searched.
         progress: callback with the number of candidates that were tried, and of all.
 
+    Returns:
+        Cycles in the order of their candidates, at least one.
+
     Raises:
         SimulationError: no candidate leads to a cycle.
     """
@@ -252,7 +255,7 @@ def close_candidates(
 
 
 def round_cycle(search: CycleSearch, model_cycle: ModelCycle, digits: int) -> ModelCycle:
-    """Round the numbers of a model, and compute its cycle with full accuracy.
+    """Return the rounded numbers of a model with their cycle, computed with full accuracy.
 
     Args:
         search: search with the plan.

@@ -152,7 +152,11 @@ def _make_walk_measure(
 
 
 def _find_footing(name: str, engine: Any, feet: Sequence[str] | None) -> FootContacts:
-    """Return the feet for a measure, which needs the compiled engine."""
+    """Return the feet for a measure that needs the compiled engine.
+
+    Raises:
+        SettingError: the engine is not the compiled one.
+    """
     if engine.name != "compiled":
         raise SettingError(f"the measure '{name}' needs the compiled engine")
     return find_footing(engine, feet)

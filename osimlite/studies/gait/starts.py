@@ -32,7 +32,9 @@ class Carriers:
 
 
 def find_carriers(engine: BatchEngine, foot_contacts: FootContacts) -> Carriers:
-    """Find the coordinates that translate the complete walker, by moving each one in random poses.
+    """Return the coordinates that translate the complete walker.
+
+    They are found by moving each coordinate in random poses.
 
     Args:
         engine: engine of the model.

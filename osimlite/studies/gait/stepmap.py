@@ -161,7 +161,11 @@ class StepMap:
         return rebuilt
 
     def _simulate_first_step(self, state: Floats) -> tuple[GaitStep, Floats]:
-        """Return the first step from a state, and states during this step (k, y)."""
+        """Return the first step from a state, and states during this step (k, y).
+
+        Raises:
+            OsimliteError: the walker makes no step from this state.
+        """
         runs = run_many(
             self.engine,
             state[None],
@@ -184,7 +188,11 @@ class StepMap:
         return walk.steps[0], runs.reports[0]
 
     def _switch_legs(self, state: Floats) -> Floats:
-        """Return a state after a touch-down of the second foot as one of the first foot."""
+        """Return a state after a touch-down of the second foot as one of the first foot.
+
+        Raises:
+            OsimliteError: the legs differ, and the walker makes no step with the first foot.
+        """
         if self.exchange is not None:
             return state[self.exchange]
         images = self._make_step(state[None], 1)
@@ -195,7 +203,7 @@ class StepMap:
         return images.states[0]
 
     def move_to_strike(self, state: Floats, foot: int) -> Floats:
-        """Move a state (y,) near a touch-down onto it, by one Newton step in time.
+        """Return the state (y,) at a touch-down near a state, by one Newton step in time.
 
         Args:
             state: state at the event of a touch-down (y,).
@@ -213,7 +221,7 @@ class StepMap:
 
     # ----------------------------------------------------------------------------------------------- images
     def __call__(self, states: ArrayLike) -> StepImages:
-        """Map states (W, y) in which the first foot has just touched down."""
+        """Return the images of states (W, y) in which the first foot has just touched down."""
         first_step = self._make_step(np.asarray(states, dtype=float), 0)
         if self.exchange is not None:
             return StepImages(
@@ -231,7 +239,7 @@ class StepMap:
         )
 
     def _make_step(self, states: Floats, leading_foot: int) -> StepImages:
-        """Simulate one step of the trailing foot."""
+        """Return the images of states after one step of the trailing foot."""
         count = len(states)
         trailing_foot = 1 - leading_foot
         result = StepImages(

@@ -238,7 +238,7 @@ def follow_events(
     reached: Floats,
     touching: NDArray[np.bool_],
 ) -> WalkerSteps:
-    """Find the steps and the fall in the events of one run, which may come from any simulator.
+    """Return the steps and the fall in the events of one run, which may come from any simulator.
 
     Args:
         footing: contacts of the feet.
