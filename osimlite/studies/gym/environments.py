@@ -124,6 +124,10 @@ class _ObservedCopies:
 
         Returns:
             Rewards (w,), and whether each copy has failed (w,).
+
+        Raises:
+            gymnasium.error.InvalidAction: the actions have another shape, or one that matters is
+                NaN.
         """
         values = np.array(actions, dtype=float)
         expected = self.count, len(self.copies.controls)
@@ -162,7 +166,12 @@ class _ObservedCopies:
 def _resolve_task(
     task: Task | Callable[[], Task] | None, model: Any, reward: Any, options: dict[str, Any]
 ) -> Task:
-    """Return the task that the arguments of an environment describe."""
+    """Return the task that the arguments of an environment describe.
+
+    Raises:
+        gymnasium.error.Error: a task has no option of a name, the environment has a fixed model but
+            another one is passed, or the model or the reward is missing.
+    """
     known_names = [field.name for field in fields(Task) if field.name not in ("model", "reward")]
     for name in options:
         if name not in known_names:
@@ -183,7 +192,11 @@ def _resolve_task(
 
 
 def _check_render_mode(mode: str | None) -> str | None:
-    """Return the mode of rendering (None for none); raise an error of Gymnasium for an unknown one."""
+    """Return the mode of rendering, or None for no rendering.
+
+    Raises:
+        gymnasium.error.UnsupportedMode: the mode is neither None nor "rgb_array".
+    """
     if mode not in (None, "rgb_array"):
         raise gymnasium.error.UnsupportedMode(f"render_mode must be 'rgb_array', not '{mode}'")
     return mode
@@ -382,7 +395,7 @@ class MuscleVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         return self._all.flatten_observations(), rewards, has_failed, is_out_of_time, {}
 
     def _reset_state(self, copy_index: int) -> Array:
-        """Draw a new initial state of a copy from the random generator of this copy."""
+        """Return a new initial state of a copy, drawn by the random generator of this copy."""
         self._all.reset_copy(copy_index, self._random[copy_index])
         return self._all.copies.states[copy_index].copy()
 

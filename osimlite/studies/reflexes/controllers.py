@@ -446,7 +446,11 @@ class Reflexes:
         node.refuse_unread_parts(f"a {name}")
 
     def _add_gate(self, node: SettingNode, parameters: Parameters, prefix: str, leg: int) -> int:
-        """Add the range of a ConditionalMuscleReflex; return its index, or -1 without a range."""
+        """Add the range of a ConditionalMuscleReflex as a gate.
+
+        Returns:
+            Index of the gate, or -1 for a reflex without a range.
+        """
         if node.get("dof") is None:
             return -1
         name = node.text("dof")

@@ -142,7 +142,15 @@ class Feedback:
     def _read_controller(
         self, model: Model, engine: Any
     ) -> tuple[SensedModel, Reflexes, Parameters]:
-        """Read the controller for a model; return the sensors, the reflexes and the parameters."""
+        """Read the controller for a model.
+
+        Returns:
+            Model with its sensors, reflexes of the controller, and parameters that the reflexes
+            use.
+
+        Raises:
+            SettingError: a value belongs to no parameter of the controller.
+        """
         sensed_model = SensedModel(model, engine, 1, self.step, self._legs)
         parameters = Parameters(self._values)
         reflexes = Reflexes(self._node, self._class_name, sensed_model, parameters)

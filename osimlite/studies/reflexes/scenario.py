@@ -249,6 +249,10 @@ class Scenario:
             count: number of candidates w.
             duration: longest duration (s); by default that of the scenario.
 
+        Returns:
+            Score and end time of each candidate, contributions of the measures to the scores, and
+            the motion of the first candidate.
+
         Raises:
             SettingError: the duration is shorter than a control step or has too many, a parameter
                 is unknown, or has another number of values than there are candidates.
@@ -397,7 +401,12 @@ class Candidates:
                     raise node.error(f"'{name}' must be a number, not '{node.value}'") from None
 
     def walk(self) -> WalkResult:
-        """Simulate the candidates; the order of equilibrium and reflexes is that of SCONE."""
+        """Simulate the candidates; the order of equilibrium and reflexes is that of SCONE.
+
+        Returns:
+            Score and end time of each candidate, contributions of the measures to the scores, and
+            the motion of the first candidate.
+        """
         walkers = self.walkers
         small = self.scenario.settings.number("initial_equilibration_activation", 0.05)
         # SCONE computes the first excitations from muscles in equilibrium at a small activation, and

@@ -248,7 +248,11 @@ class SettingNode:
 
 
 def parse_finite(text: str) -> float:
-    """Parse a finite number; raise ValueError for anything else."""
+    """Return the finite number that a text contains.
+
+    Raises:
+        ValueError: the text is not a number, or the number is infinite or NaN.
+    """
     number = float(text)
     if not math.isfinite(number):
         raise ValueError(f"{text} is not finite")
@@ -263,7 +267,11 @@ class _Budget:
     parts: int = MAX_PARTS
 
     def take_file(self, path: Path) -> None:
-        """Count a file, and raise an error if there are too many."""
+        """Count a file of a scenario.
+
+        Raises:
+            DocumentError: the scenario includes too many files.
+        """
         self.files -= 1
         if self.files < 0:
             raise DocumentError(
@@ -272,7 +280,11 @@ class _Budget:
             )
 
     def take_part(self, node: SettingNode) -> None:
-        """Count a part of a scenario, and raise an error if there are too many."""
+        """Count a part of a scenario.
+
+        Raises:
+            DocumentError: the scenario has too many parts.
+        """
         self.parts -= 1
         if self.parts < 0:
             raise node.error(
@@ -281,7 +293,7 @@ class _Budget:
 
 
 def read_settings(path: str | Path) -> SettingNode:
-    """Read a scenario file and the files that it includes.
+    """Return the settings in a scenario file and in the files that it includes.
 
     Included files are searched in the folder of the file that includes them, in that of the
     scenario, and in up to three folders above each.
@@ -321,7 +333,12 @@ def _list_parts(key: str, value: Any) -> Iterator[tuple[str, SettingNode]]:
 def _read_source(
     path: Path, base: Path, constants: dict[str, str], depth: int, budget: _Budget
 ) -> SettingNode:
-    """Read a file of any supported format, with all files that it includes."""
+    """Return the settings in a file of any supported format, and in all files that it includes.
+
+    Raises:
+        DocumentError: the file is not UTF-8 or is malformed, includes itself through other files,
+            or includes too many files.
+    """
     budget.take_file(path)
     try:
         text = read_file(path).decode()
@@ -378,6 +395,10 @@ def _fill_from_yaml(
         depth: number of includes that led to this file.
         level: nesting of mappings.
         budget: remaining files and parts.
+
+    Raises:
+        DocumentError: the YAML is no mapping, nests too deeply or has too many parts; a key is not
+            a word; or an included file cannot be read.
     """
     if mapping.id != "mapping":
         raise node.error("expected keys with values")
@@ -439,7 +460,11 @@ class _TokenReader:
         self.index = 0
 
     def next(self) -> str:
-        """Return the next token, and move on."""
+        """Return the next token, and move on.
+
+        Raises:
+            DocumentError: there is no token left.
+        """
         if self.index >= len(self.tokens):
             raise DocumentError(
                 "the file ends too early: a value or a '}' is missing",
@@ -486,7 +511,12 @@ class _TokenReader:
                 node.parts.append((key.strip('"'), child_node))
 
     def _read_value(self) -> str:
-        """Return a value: a word, the words of a list, or the value of a constant."""
+        """Return a value: a word, the words of a list, or the value of a constant.
+
+        Raises:
+            DocumentError: the next token is a brace or an equals sign, there is none, or a constant
+                is unknown.
+        """
         value = self.next()
         if value == "[":
             texts = []

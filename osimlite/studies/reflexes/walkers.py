@@ -193,7 +193,11 @@ class SensedModel:
         return np.array(plan, dtype=np.int64), numbers
 
     def _find_legs(self, upper: str, lower: str, contact: str) -> list[Leg]:
-        """Find the legs whose bodies and contact forces have the given names and a side."""
+        """Return the legs whose bodies and contact forces have the given names and a side.
+
+        Raises:
+            ModelError: the upper body of a leg is attached to ground and not to another body.
+        """
         names = [body.name for body in self.mechanism.bodies]
         parents = {
             body.name: names[body.parent] for body in self.mechanism.bodies if body.parent != GROUND
