@@ -151,8 +151,8 @@ def parse_controls(words: Iterable[str]) -> dict[str, Any]:
         Controls by the name of the actuator.
 
     Raises:
-        SettingError: a word is neither a file nor ``NAME=VALUE`` with a number, or two words set the
-            same control.
+        SettingError: a word is neither a file nor ``NAME=VALUE`` with a number, or two words set
+            the same control.
         OsimliteError: a file cannot be read.
     """
     result: dict[str, Any] = {}
