@@ -31,7 +31,7 @@ def run_python_file(path: Path) -> ModuleType:
     Raises:
         MissingFileError: the file does not exist.
         OsimliteError: the code raises an error; with the line.
-    """
+    """  # noqa: DOC501 - a function makes the error, which is named
     if not path.is_file():
         raise make_missing_error(path)
     # A private name, so that a model in json.py does not replace the module json.

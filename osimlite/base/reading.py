@@ -33,7 +33,7 @@ def open_file(path: str | Path) -> BinaryIO:
     Raises:
         SpecialFileError: the path is a pipe, a device or a similar file.
         MissingFileError: the file does not exist or is not readable.
-    """
+    """  # noqa: DOC501 - a function makes the error, which is named
     try:
         # Check before opening, because opening a device can have effects, and after it, because
         # the file can have been replaced meanwhile.

@@ -348,7 +348,7 @@ def _open_temporary(
     Raises:
         OsimliteError: the target is read-only, its folder does not exist, or the file cannot be
             written.
-    """
+    """  # noqa: DOC501 - a function makes the error, which is named
     # The mode counts too, because root may write read-only files.
     if target_stat is not None and not (target_stat.st_mode & 0o222 and os.access(target, os.W_OK)):
         raise OsimliteError(

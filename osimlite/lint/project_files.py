@@ -156,7 +156,7 @@ def find_project_files(
         MissingFileError: a path does not exist.
         MissingFolderError: a path without a suffix does not exist.
         OsimliteError: a folder contains no OpenSim file.
-    """
+    """  # noqa: DOC501 - a function makes the error, which is named
     result: list[str] = []
     skipped: list[str] = [] if passed is None else passed
     for path in paths:

@@ -89,7 +89,7 @@ class SemiImplicitEuler(Stepper):
         Raises:
             IntegrationError: the state is not finite, a derivative cannot be computed, or no state
             near the end of the step fulfils the constraints.
-        """
+        """  # noqa: DOC501 - a function makes the IntegrationError
         self._require_later(limit)
         h = self._h
         # Steps are counted from an origin, so that rounding errors of the time do not accumulate.

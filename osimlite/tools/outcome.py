@@ -167,7 +167,7 @@ class Outcome:
 
         Raises:
             SimulationError: a number is infinite, or is NaN where NaN is not allowed.
-        """
+        """  # noqa: DOC501 - a function makes the error, which is named
         motion = self.evidence
         if motion is not None and not np.isfinite(motion.values).all():
             row, index = np.argwhere(~np.isfinite(motion.values))[0]

@@ -167,7 +167,7 @@ def assemble_pose(mechanism: Mechanism, request: bytes) -> dict[str, Any]:
 
     Raises:
         _BadRequest: the request is not a list of one number per coordinate.
-    """
+    """  # noqa: DOC501 - the error is caught here
     try:
         match json.loads(request):
             case {"values": [*values]} if all(isinstance(value, int | float) for value in values):

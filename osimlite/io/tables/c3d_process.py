@@ -28,7 +28,7 @@ def run_process() -> None:
 
     Raises:
         SystemExit: the file cannot be read; with exit code 1.
-    """
+    """  # noqa: DOC501 - the error is caught here
     content_type, path, seconds = sys.argv[1:4]
     _limit_resources(int(seconds))
     try:

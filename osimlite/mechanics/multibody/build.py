@@ -173,7 +173,7 @@ class _Builder:
 
         Raises:
             UnsupportedError: the component is a joint, a body or a constraint of an unknown class.
-        """
+        """  # noqa: DOC501 - functions make the UnsupportedError
         if not isinstance(component, Unknown):
             return
         holder, path = self.tree.parent_of(component), self.placements.path(component)

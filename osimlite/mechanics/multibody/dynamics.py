@@ -164,7 +164,7 @@ def accelerations(state: MechanismKinematics, applied: Array) -> Array:
     Raises:
         SimulationError: a motion that the constraints allow moves no mass, or a number is not
             finite.
-    """
+    """  # noqa: DOC501 - a function makes the SimulationError
     program = state.program
     mechanism = state.mechanism
     size = len(state.q)

@@ -100,7 +100,7 @@ class Formula:
         Raises:
             UnknownVariableError: the formula needs an unknown variable.
             ModelError: the text is no formula.
-        """
+        """  # noqa: DOC501 - FormulaError is caught here
         main, *definitions = re.sub(r"\s", "", text).split(";")
         reader = _FormulaReader(variables)
         try:

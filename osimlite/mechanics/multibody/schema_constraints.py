@@ -37,7 +37,7 @@ class ConstraintReader:
             ModelError: a reference has no target, or a function, a direction or a distance is
                 impossible.
             UnsupportedError: the constraint is of an unknown class.
-        """
+        """  # noqa: DOC501 - a function makes the UnsupportedError
         make = _READERS.get(type(constraint))
         path = self.placements.path(constraint)
         if make is None:

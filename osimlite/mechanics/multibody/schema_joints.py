@@ -65,7 +65,7 @@ def joint_motions(
         ModelError: the number of coordinates is wrong, or an axis, a function or radii are
             impossible.
         UnsupportedError: the joint or a function is of an unknown class.
-    """
+    """  # noqa: DOC501 - a function makes the UnsupportedError
     class_name = type(joint).__name__
     coordinates = list(joint.coordinates)
     # Classes are compared by name, so that those of other joints are not imported.

@@ -163,7 +163,7 @@ def optimize(
         SettingError: an argument is out of bounds, every variable has one value only, or the
             folder has results of other settings.
         OsimliteError: the model cannot be simulated, or the cluster cannot be reached.
-    """
+    """  # noqa: DOC501 - a function makes the SweepInterruption
     minimize = find_method(method)
     reject_grid_ranges(plan.variables)
     free_indices = [index for index, variable in enumerate(plan.variables) if not variable.is_fixed]

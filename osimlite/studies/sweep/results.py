@@ -74,7 +74,7 @@ def settings_of(path: str | Path) -> dict[str, Any]:
     Raises:
         MissingFileError: there is no such file.
         OsimliteError: the file is not a table of results.
-    """
+    """  # noqa: DOC501 - a function makes the MissingFileError
     pq = require("pyarrow.parquet", extra="sweep", purpose="a table of results")
     if not Path(path).exists():
         raise make_missing_error(path)

@@ -157,7 +157,7 @@ def sweep(
         SettingError: the name of the output is that of another kind of table, or there are results
             of other settings.
         OsimliteError: the model cannot be simulated, or the cluster cannot be reached.
-    """
+    """  # noqa: DOC501 - a function makes the SweepInterruption
     path = Path(output)
     started = time.perf_counter()
     if path.suffix.lower() in OTHER_TABLE_ENDINGS:

@@ -247,7 +247,7 @@ def resolve_variables(
     Raises:
         SettingError: a name is unknown (the message suggests the nearest), a range is malformed, a
             unit does not fit, or two variables are the same number.
-    """
+    """  # noqa: DOC501 - a function makes the SettingError
     result: list[Variable] = []
     for names, value_range in ranges.items():
         meanings = [

@@ -40,7 +40,7 @@ They raise `Untranslatable` if MuJoCo cannot express it.
 
 
 def add_forces(draft: MjcfDraft) -> None:
-    """Add every active force whose law MuJoCo has."""
+    """Add every active force whose law MuJoCo has."""  # noqa: DOC501 - the error is caught here
     for force, path in draft.iterate_components(Force):
         class_name = type(force).__name__
         try:
