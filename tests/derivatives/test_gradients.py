@@ -117,7 +117,7 @@ def test_a_search_arrives(tmp_path):
     ("choices", "message"),
     [
         ({"integrator": "rosenbrock"}, "integrator 'merson'"),
-        ({"below": {"Pelvis_ty": 0.1}}, "remove --below"),
+        ({"below": {"Pelvis_ty": 0.1}}, "remove the levels that end runs"),
         ({"measures": ("steps",)}, "depends on events"),
     ],
 )

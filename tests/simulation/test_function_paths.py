@@ -53,7 +53,7 @@ def spring(moment_arm_functions=(), **properties):
         ),
         (
             {"coordinate_paths": TWO, "length_function": PLANE, "moment_arm_functions": [PLANE]},
-            "1 moment_arm_functions for 2 coordinates",
+            "1 moment_arm_function for 2 coordinates",
         ),
         (
             {
