@@ -102,24 +102,35 @@ def convert_state(path: str, value: float | str) -> float:
         raise SettingError(f"the state '{path}' takes a number, not '{value}'") from None
 
 
-def describe_suspect_activations(model: Model, initial: Mapping[str, float | str]) -> str:
+def find_suspect_activations(initial: Mapping[str, float | str]) -> dict[str, float]:
+    """Return the values of activations outside 0 to 1 by the paths of their states.
+
+    Args:
+        initial: values by the paths of states and the names of coordinates.
+    """
+    activations = {
+        path: convert_state(path, value)
+        for path, value in initial.items()
+        if path.endswith("/activation")
+    }
+    return {path: value for path, value in activations.items() if not 0.0 <= value <= 1.0}
+
+
+def describe_suspect_activations(model: Model, suspect_values: Mapping[str, float]) -> str:
     """Return a warning if activations of muscles are outside 0 to 1, which OpenSim accepts.
 
     Args:
         model: the model.
-        initial: values by the paths of states and the names of coordinates.
+        suspect_values: values outside 0 to 1 by the paths of states.
 
     Returns:
-        A sentence, or "" if all activations are plausible.
+        A sentence, or "" if none of them belongs to a muscle.
     """
-    outside = [path for path, value in initial.items() if _is_outside_activation(path, value)]
-    if not outside:
-        return ""
     tree = model.tree()
     # Activations of other actuators, as of an ActivationCoordinateActuator, have no such range.
     muscles = [
-        f"'{path}' = {float(initial[path]):g}"
-        for path in outside
+        f"'{path}' = {value:g}"
+        for path, value in suspect_values.items()
         if is_a(tree.find(path.rpartition("/")[0]), "Muscle")
     ]
     return (
@@ -127,11 +138,6 @@ def describe_suspect_activations(model: Model, initial: Mapping[str, float | str
         if muscles
         else ""
     )
-
-
-def _is_outside_activation(path: str, value: float | str) -> bool:
-    """Return whether a state is an activation, and its value a number outside 0 to 1."""
-    return path.endswith("/activation") and not 0.0 <= convert_state(path, value) <= 1.0
 
 
 def resolve_initial_values(

@@ -31,6 +31,7 @@ from osimlite.simulation.initial_state import (
     describe_suspect_activations,
     describe_suspect_value,
     extract_state,
+    find_suspect_activations,
     read_earlier_run,
     read_state,
     resolve_initial_values,
@@ -225,7 +226,9 @@ class Simulation:
             if name not in self.paths:
                 info = self.mechanism.coordinates[self.mechanism.coordinate_index(name)]
                 warn_of_unit(describe_suspect_value(info, name, value))
-        if message := describe_suspect_activations(self.model, requested):
+        # The model is copied at its first use here, which takes longer than the check.
+        suspect_values = find_suspect_activations(requested)
+        if suspect_values and (message := describe_suspect_activations(self.model, suspect_values)):
             warn_caller(message)
         controls = self.forces.controls
         extra_settings = {}

@@ -125,7 +125,9 @@ def test_a_run_that_fails_does_not_harm_the_others(engine, starts):
 def test_wrong_words_are_refused(engine, starts):
     with pytest.raises(OsimliteError, match="14 numbers"):
         run_many(engine, starts[:, 1:])
-    with pytest.raises(OsimliteError, match="expected an array of the shape .20, [0-9]+., one row for each run"):
+    with pytest.raises(
+        OsimliteError, match="expected an array of the shape .20, [0-9]+., one row for each run"
+    ):
         run_many(engine, starts, numbers=np.zeros((3, 5)))
     with pytest.raises(OsimliteError, match="'x' must name exactly one of"):
         run_many(engine, starts, watches=[Watch("x")])
