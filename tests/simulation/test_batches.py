@@ -126,7 +126,7 @@ def test_wrong_words_are_refused(engine, starts):
     with pytest.raises(OsimliteError, match="14 numbers"):
         run_many(engine, starts[:, 1:])
     with pytest.raises(
-        OsimliteError, match="expected an array of the shape .20, [0-9]+., one row for each run"
+        OsimliteError, match=r"expected an array of the shape .20, [0-9]+., one row for each run"
     ):
         run_many(engine, starts, numbers=np.zeros((3, 5)))
     with pytest.raises(OsimliteError, match="'x' must name exactly one of"):
