@@ -93,6 +93,14 @@ class Request:
                 "alone; to convert the table together with its model, name the model first and "
                 "add --motion"
             )
+        written_only = {
+            exporter.suffix: exporter for exporter in EXPORTERS if exporter.name not in sources
+        }
+        if source_format is None and file.suffix in written_only:
+            exporter = written_only[file.suffix]
+            raise SettingError(
+                f"osimlite writes {exporter.title or exporter.name.upper()} files, but does not read them"
+            )
         if source_format is None:
             raise SettingError(
                 f"'convert' does not recognize the format of '{file.name}'; name the format with --from: "

@@ -98,8 +98,8 @@ AppliedTo = Annotated[
         "--applied-to",
         metavar="BODY=FORCE,POINT,MOMENT",
         help="The columns of the table in --external-loads that contain the load on a body: the prefixes of the labels of "
-        "force, point and moment, such as f1_,p1_,m1_ for the first plate of a .c3d. Point and moment are optional. Join "
-        "several loads with +.",
+        "force, point and moment, such as f1_,p1_,m1_ for the first plate of a .c3d. Point and moment are optional. "
+        "Separate several loads on one body by +: calcn_l=f2_,p2_,m2_+f3_,p3_,m3_.",
         show_default=False,
     ),
 ]

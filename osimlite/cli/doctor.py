@@ -57,7 +57,7 @@ NEEDS: dict[str, tuple[str, ...]] = {
     "simulate --animate": ("numpy", "pillow"),
     "osimlite.gym": ("gymnasium", "numpy"),
     "markers and forces of .c3d files": ("numpy", "ezc3d"),
-    "osimlite.mjcf.Driver, translate --check": ("mujoco", "numpy"),
+    "osimlite.mjcf.Driver, translate --check, translate --to osim": ("mujoco", "numpy"),
     "osimlite.casadi": ("casadi", "numpy"),
     "models as YAML": ("pyyaml",),
     "trajectory.to_frame()": ("pandas",),

@@ -91,8 +91,8 @@ def run(
     """Run setup files of OpenSim's tools, and write the files that OpenSim would write.
 
     A setup and the files that it names are checked first, as by 'osimlite validate'; it does not run
-    if they have an error. A file name is looked up in the folder of the setup, then in the current
-    folder. 'run-tool' is another name of this command.
+    if they have an error with which OpenSim would not run either. A file name is looked up in the
+    folder of the setup, then in the current folder. 'run-tool' is another name of this command.
 
     A setup waits for the setups that write its input files. If one fails, only those that need it
     are skipped. Finished setups are recorded, and --resume continues after Ctrl-C, a crash or an

@@ -35,7 +35,7 @@ def upgrade(
     """Convert a file of an older version to the current format, and list what changed and what was lost.
 
     Components get the names and paths that OpenSim gives them. Comments and numbers do not change.
-    Files to which it refers are not converted.
+    Other files that are named in the old file are not converted.
 
     Example: osimlite upgrade gait2354.osim -o gait2354_v4.osim
     """

@@ -55,7 +55,7 @@ class SimulationCheck:
         worst_path = max(at_end, key=lambda path: at_end[path])
         return (
             f"within {MATCH_TOLERANCE:g} rad or m of the solution until {self.matches_until:.4g} s of {self.times[-1]:.4g} s; "
-            f"at the end {worst_path.rpartition('/')[2]} differs by {at_end[worst_path]:.2g}"
+            f"the largest difference at the end is {at_end[worst_path]:.2g}, of '{worst_path.rpartition('/')[2]}'"
         )
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar, cast, overl
 from osimlite.base.lazy import make_notebook_repr
 from osimlite.base.text import add_article
 from osimlite.errors import ModelError, OsimliteError
-from osimlite.schema.base import Component, ModelComponent, make_default
+from osimlite.schema.base import Component, ModelComponent, Object, make_default
 from osimlite.schema.contact import ContactGeometrySet
 from osimlite.schema.facts import Facts
 from osimlite.schema.fields import Single, Text, Unnamed, Vec3, real, vec3
@@ -185,6 +185,10 @@ class Model(ModelComponent):
                     _append_member(cast("Any", holder).objects, component)
                     break
             else:
+                if not isinstance(component, Object):
+                    raise ModelError(
+                        f"expected a component, found {add_article(type(component).__name__)}"
+                    )
                 if not isinstance(component, ModelComponent):
                     raise ModelError(
                         f"no set of a model accepts {add_article(type(component).__name__)}; add it to its owner, such as "

@@ -132,7 +132,7 @@ class RecordedMotion(Movement):
             sentences.append(f"not in the motion, default value used: {join_words(missing)}")
         if self.ignored:
             names = join_words(self.ignored)
-            sentences.append(f"ignored columns, which are not coordinates: {names}")
+            sentences.append(f"ignored columns (no coordinate, or a repeated one): {names}")
         return sentences
 
     @classmethod

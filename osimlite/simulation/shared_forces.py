@@ -82,5 +82,5 @@ class SharedForces:
         counts = f"{len(failed)} of {format_count(len(self.times), 'time')}"
         return (
             f"no solution at {counts} (first at {self.times[failed[0]]:g} s); the tables have NaN there; "
-            f"at {self.times[worst]:g} s the actuators are too weak by {self.describe_missing_force(worst)}"
+            f"at {self.times[worst]:g} s the actuators lack {self.describe_missing_force(worst)}"
         )

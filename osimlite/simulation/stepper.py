@@ -210,7 +210,8 @@ class Stepper(ABC):
             derivative = self._f(t, y)
         except (ArithmeticError, ValueError) as failure:
             raise IntegrationError(
-                f"The derivative cannot be computed at t = {t:.9g} s: {failure}.", t
+                f"a force, a control function or another part of the model cannot be computed at t = {t:.9g} s: {failure}",
+                t,
             ) from failure
         # x - x is 0 for finite x only, and one sum is faster than a test of each entry. A sum of
         # finite numbers may overflow, so the entries are then tested.

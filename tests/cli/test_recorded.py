@@ -26,7 +26,7 @@ def test_the_walker_in_a_recorded_motion(fixtures: Path, tmp_path: Path) -> None
     )
     done = run("kinematics", walker, "walk.mot", "-o", "out", folder=tmp_path)
     assert (done.code, done.err) == (0, "")
-    assert "ignored columns, which are not coordinates: emg" in done.out
+    assert "ignored columns (no coordinate, or a repeated one): emg" in done.out
     bodies = read_sto(tmp_path / "out" / "bodies.sto")
     assert bodies.in_degrees
     assert bodies["RightShank_Oz"] - bodies["RightThigh_Oz"] == pytest.approx(

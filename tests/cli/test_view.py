@@ -110,7 +110,7 @@ def test_columns_that_do_not_move_the_model_are_named(
     lines = capsys.readouterr().out.splitlines()
     assert lines[:2] == [
         "not in the motion, default value used: knee_angle",
-        "ignored columns, which are not coordinates: kne_angle",
+        "ignored columns (no coordinate, or a repeated one): kne_angle",
     ]
     # A coordinate that the user sets, by name or by path, has no default value.
     for name in ("knee_angle", "/jointset/knee/knee_angle"):

@@ -80,7 +80,7 @@ def test_one_actuator_bounds_and_forces_from_files(tmp_path: Path) -> None:
     assert other.columns == ("reserve",)
     assert not other.solved.any() and np.isnan(other.rows).all()
     assert "no solution at 51 of 51 times (first at 0 s)" in (said := other.describe_unsolved())
-    assert "the actuators are too weak by 19.61 N at y" in said
+    assert "the actuators lack 19.61 N at y" in said
     with pytest.warns(DeprecatedWarning, match="use describe_unsolved"):
         assert other.unsolved() == said
     off = lift(30.0, 10.0)

@@ -118,7 +118,7 @@ def test_what_has_no_solution_is_told_and_not_written(walk: Path) -> None:
     assert result.summary["StaticOptimization_unsolved"] == np.count_nonzero(failed)
     assert np.isnan(table.rows).any(axis=1).tolist() == failed.tolist()
     assert np.isnan(forces.rows[failed, :28]).all()
-    assert "too weak by" in (said := dict(result.messages)["StaticOptimization"])
+    assert "the actuators lack" in (said := dict(result.messages)["StaticOptimization"])
     assert "knee_angle_r" in said
     document = osimlite.read_document(
         walk.parent / "Results" / "walk_StaticOptimization_controls.xml"

@@ -232,10 +232,10 @@ def report_load_place(setup: Setup, report: FindingCollector) -> None:
         # The sum of the reactions of a gait points up, apart from some braking.
         if math.hypot(*mean_force) > max(0.5 * mass * weight, 2.0 * lift):
             report(
-                f"the mean sum of these forces is {math.hypot(*mean_force):.0f} N "
-                f"({', '.join(f'{n:.0f}' for n in mean_force)}), which does not point up, against the "
-                f"model's gravity ({', '.join(f'{n:g}' for n in model.gravity)}): are their axes or signs "
-                "wrong, or is the gravity?",
+                f"the mean sum of these forces, ({', '.join(f'{n:.0f}' for n in mean_force)}) N, does not "
+                "point up, which is opposite to the model's gravity, "
+                f"({', '.join(f'{n:g}' for n in model.gravity)}) m/s^2: check axes and signs of the "
+                "forces, and the gravity",
                 loads,
                 tag="datafile",
             )

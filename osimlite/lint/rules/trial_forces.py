@@ -141,10 +141,7 @@ def report_residual_force(trial: Trial, report: FindingCollector) -> None:
     + peak of FY of RRA: 8.1 N, with loads of 850 N
     ```
     """
-    advice = (
-        "check masses and mass centres, the filter, and that the loads agree with the motion in time "
-        "and act on the correct foot"
-    )
+    advice = "check masses and mass centres, the filter, and that the loads agree with the motion in time"
     trial.judge(report, [FORCE_GOOD, RELATIVE_FORCE, FORCE_BAD], _BOTH, advice, "peak")
     trial.judge(report, [FORCE_RMS_GOOD, FORCE_RMS_BAD], OPENSIM, advice, "rms")
 

@@ -234,8 +234,8 @@ def report_swapped_feet(trial: Trial, report: FindingCollector) -> None:
     Reports a force that acts nearer to another loaded body, or to the body of the other side, than
     to the body to which the setup applies it.
 
-    All moments of both legs are wrong by the force times the step width or length. The residuals
-    show this error.
+    All moments of both legs are wrong by the force times the step width or length. The residuals do
+    not show this error, because they depend on the sum of the loads.
 
     ```trial
     - share of the time that the force 'right' acts nearer to calcn_l than to calcn_r: 100 %

@@ -208,7 +208,7 @@ class _FormulaReader(SimplifiedSteps):
             else:
                 raise FormulaError(f"there is an unexpected '{word}'; remove it")
         if wants_operand:
-            raise FormulaError("it ends too early; complete it")
+            raise FormulaError("it ends too early")
         self._apply_waiting(0)
         if self._waiting:
             raise FormulaError("its parentheses do not match; close them")

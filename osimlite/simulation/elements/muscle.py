@@ -136,7 +136,9 @@ def _describe_failure(values: Mapping[str, float]) -> str:
     )
     # Not every search is for a fiber length.
     fibers_text = (
-        f", with fibers of {values['fiber_length']:.4g} m" if values["fiber_length"] > 0.0 else ""
+        f"; the search stopped at a fiber length of {values['fiber_length']:.4g} m"
+        if values["fiber_length"] > 0.0
+        else ""
     )
     return (
         f", whose path of {values['length']:.4g} m is {abs(excess_length):.3g} m "

@@ -11,7 +11,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from osimlite.base.text import join_words, suggest_or_list
+from osimlite.base.text import suggest_or_list
 from osimlite.errors import SettingError
 from osimlite.mechanics.kernels.reflexes import LIMITS, TERM
 from osimlite.mechanics.kernels.sensors import SENSOR_NUMBERS
@@ -77,12 +77,7 @@ class Feedback:
         if objective is not None:
             controller_parent = objective
             model = objective.get("ModelOpenSim4") or SettingNode()
-        selection = controller_parent.select_one(*CONTROLLERS)
-        if selection is None:
-            raise controller_parent.error(
-                f"a controller is required; supported: {join_words(list(CONTROLLERS))}"
-            )
-        self._class_name, self._node = selection
+        self._class_name, self._node = controller_parent.require_one("controller", CONTROLLERS)
         self.step = read_control_step(model)
         self._legs = read_leg_names(model)
         initial_values = {

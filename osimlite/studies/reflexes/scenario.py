@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from osimlite.base.records import dataclass
-from osimlite.base.text import format_count, join_words, suggest_or_list
+from osimlite.base.text import format_count, suggest_or_list
 from osimlite.errors import SettingError, SimulationError
 from osimlite.io.document.reader import read
 from osimlite.io.tables.storage import StoTable, read_sto
@@ -189,18 +189,8 @@ class Scenario:
         ):
             settings.get(key)
         settings.refuse_unread_parts("a ModelOpenSim4")
-        controller = objective.select_one(*CONTROLLERS)
-        measure = objective.select_one(*MEASURES)
-        if controller is None:
-            other_controller = next(
-                (name for name, _ in objective.parts if name.endswith("Controller")), "none"
-            )
-            raise objective.error(
-                f"osimlite does not support {other_controller}; supported controllers: {join_words(list(CONTROLLERS))}"
-            )
-        if measure is None:
-            raise objective.error(f"a measure is required; supported: {join_words(list(MEASURES))}")
-        self.controller, self.measure = controller, measure
+        self.controller = objective.require_one("controller", CONTROLLERS)
+        self.measure = objective.require_one("measure", MEASURES)
         objective.refuse_unread_parts("a SimulationObjective", tuple(MEASURES))
         method = settings.text("integration_method", "SemiExplicitEuler2")
         if method not in INTEGRATORS:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterable, Iterator, Mapping
+from difflib import get_close_matches
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
@@ -198,6 +199,34 @@ class SettingNode:
                 f"'{matches[1][0]}' follows '{matches[0][0]}', but only one is allowed here; put both into a composite one"
             )
         return matches[0] if matches else None
+
+    def require_one(self, noun: str, names: Iterable[str]) -> tuple[str, SettingNode]:
+        """Return the only part with any of some keys.
+
+        Args:
+            noun: noun for the part in messages, such as "controller".
+            names: supported keys.
+
+        Returns:
+            Key and node.
+
+        Raises:
+            DocumentError: there is no such part, or there are several. A part with a similar key, or
+                whose key ends with the noun, is named.
+        """
+        supported = list(names)
+        selection = self.select_one(*supported)
+        if selection is not None:
+            return selection
+        choices = f"osimlite supports {join_words(supported)}"
+        for key, node in self.parts:
+            # Names of SCONE's classes are alike: MirrorController is not a misspelt ReflexController.
+            if matches := get_close_matches(key, supported, n=1, cutoff=0.9):
+                raise node.error(f"unknown {noun} '{key}'; did you mean '{matches[0]}'?")
+        for key, node in self.parts:
+            if key.endswith(noun.capitalize()):
+                raise node.error(f"osimlite does not support {key}; {choices}")
+        raise self.error(f"a {noun} is required; {choices}")
 
     def error(self, message: str) -> DocumentError:
         """Return an error that points at this node."""

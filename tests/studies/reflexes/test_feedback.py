@@ -276,6 +276,7 @@ def test_a_run_goes_on_by_the_gains_that_it_began_with(
     ("given", "words"),
     [
         ({"DofReflex": {}}, "a controller is required"),
+        ({"ReflexControler": {}}, "'ReflexControler'; did you mean 'ReflexController'"),
         (
             {"ReflexController": [REFLEXES] * 2},
             "'ReflexController' follows 'ReflexController', but only one is allowed",

@@ -210,7 +210,9 @@ def test_yaml_and_data_of_python_say_the_same_as_a_scenario(arm, tmp_path) -> No
             "'NoiseController' of a Reflex",
         ),
         ("dof = elbow", "dof = knee", "no coordinate 'knee'"),
-        ("DofMeasure", "BodyMeasure", "a measure is required"),
+        ("DofMeasure", "BodyMeasure", "osimlite does not support BodyMeasure; osimlite supports"),
+        ("DofMeasure", "DoffMeasure", "unknown measure 'DoffMeasure'; did you mean 'DofMeasure'"),
+        ("ReflexController", "ReflexControler", "unknown controller 'ReflexControler'; did you"),
         ("max_duration = 1", "max_duration = long", "must be a number, not 'long'"),
         ("~2<0,20>", "~x", "must be a number or a parameter"),
         (
