@@ -119,6 +119,7 @@ def inverse_kinematics(
         weight, value = (
             goal if isinstance(goal, tuple) else (goal, mechanism.coordinates[index].default_value)
         )
+        check_weight(float(weight), f"the coordinate '{name}'")
         goals.append(CoordinateTarget(index, float(weight)))
         targets.append(float(value))
     # Constant targets, in the form of a table over time.

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from osimlite.base.records import dataclass
+from osimlite.base.text import join_words
 from osimlite.errors import SettingError
 from osimlite.fitting.fit_messages import describe_fit
 from osimlite.fitting.fitted_motion import FittedMotion
@@ -35,12 +36,18 @@ class MarkerPlacement:
     moved: dict[str, float]  # distance by which each marker moved, m
 
     def describe_pose(self) -> Iterator[tuple[str, str]]:
-        """Return messages about the pose, with OpenSim's limits for a static trial.
+        """Yield messages about the pose, with OpenSim's limits for a static trial.
 
-        Returns:
-            Iterator over the subject and the text of each message, see :func:`describe_fit`.
+        Yields:
+            The subject and the text of each message, see :func:`describe_fit`.
         """
-        return describe_fit(self.pose, (0.01, 0.02), " for markers on bones")
+        yield from describe_fit(self.pose, (0.01, 0.02), " for markers on bones")
+        if self.removed:
+            names = join_words(self.removed)
+            yield (
+                "removed markers",
+                f"removed from the model, as in OpenSim, because the data lack them: {names}",
+            )
 
 
 def place_markers(

@@ -7,7 +7,7 @@ imports the linter.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import isfinite, nan
+from math import isfinite, isnan, nan
 from typing import ClassVar
 
 from osimlite.base.named_tuples import NamedTuple
@@ -182,7 +182,15 @@ class Trial(CheckTarget):
                     number.at.line if number.at is not None else None,
                 )
             )
-            if verdict != GOOD:
+            if isnan(number.value):
+                report(
+                    f"{STATISTICS.get(kind, '')}{number.of} has no value: the results have NaN, "
+                    "which stands for times without a solution; run the tool again, and follow its "
+                    "messages",
+                    at=number.at,
+                    severity=None if number.is_final else Severity.INFO,
+                )
+            elif verdict != GOOD:
                 unit = "" if not number.unit else f" {number.unit}" if number.unit != "%" else " %"
                 bad_note = (
                     f", and more than {bad_limit:.3g}{unit} is bad"

@@ -64,6 +64,10 @@ def test_a_trial_is_fitted(lab: Path) -> None:
             ("ik", "box.osim", "walk.trc", "--keep", "knee=1"),
             "--keep: 'box' has no coordinate 'knee'",
         ),
+        (
+            ("ik", "box.osim", "walk.trc", "--keep", "j_coord_0=-5"),
+            "the weight -5 of the coordinate 'j_coord_0' is invalid",
+        ),
         (("ik", "box.osim", "walk.trc", "--from", "7"), "no frame of 'walk.trc' lies after"),
         (("ik", "box.osim", "none.trc"), "none.trc: cannot read the file"),
         (("ik", "box.osim", "box.osim"), "this is not a marker file"),
@@ -208,3 +212,11 @@ def test_a_marker_that_is_not_there_cannot_be_held(lab: Path) -> None:
     """The message suggests the nearest name, and nothing is written."""
     done = run("fit", "box.osim", "walk.trc", "--hold", "on", "-o", "out", folder=lab)
     assert done.code != 0 and "one" in done.err and not (lab / "out").exists()
+
+
+def test_markers_that_placing_removes_are_named(lab: Path) -> None:
+    trial = lab / "walk.trc"
+    trial.write_text(trial.read_text().replace("three", "other"))
+    done = run("scale", "box.osim", "walk.trc", "--place", folder=lab)
+    assert (done.code, done.err) == (0, "")
+    assert "because the data lack them: three" in " ".join(done.out.split())

@@ -15,6 +15,7 @@ from osimlite.io.document.source import Source
 from osimlite.lint import Config, Severity, rules, validate
 from osimlite.lint.baseline import subtract_baseline, write_baseline
 from osimlite.lint.diagnostic import Consequence
+from osimlite.lint.engine import run_rules
 from osimlite.lint.pages import format_index, format_rule_page
 from osimlite.lint.registry import (
     DOCUMENT_MODULES,
@@ -24,6 +25,7 @@ from osimlite.lint.registry import (
     all_rules,
     rule_groups,
 )
+from osimlite.lint.trial import Measurement, Trial
 from osimlite.schema.model import CURRENT_VERSION
 from tests.cases import of_each
 
@@ -378,3 +380,16 @@ def test_a_group_has_a_page_with_its_rules(capsys):
         out = capsys.readouterr().out
         assert out.startswith("# scale-setting (OSIM853)\n\nA setting of the scale tool")
         assert "OSIM85307  marker-pair-count" in out and out.count("\nOSIM853") == 12
+
+
+def test_a_measurement_that_is_nan_has_no_advice_for_its_size() -> None:
+    """Static optimization writes NaN where it finds no solution; masses and filters do not matter there."""
+    (rule,) = (rule for rule in all_rules() if rule.code == "OSIM911")
+    number = Measurement(rule.name, "peak", "FX of static optimization", float("nan"), "N", 850.0)
+    (finding,) = run_rules(Trial("r.sto", b"", [number])).findings
+    assert (finding.code, finding.severity.value) == ("OSIM911", "warning")
+    assert (
+        "the peak of FX of static optimization has no value: the results have NaN"
+        in finding.message
+    )
+    assert "masses" not in finding.message

@@ -218,6 +218,15 @@ def _report_old(
     replacement = f"write <{successor_tag.tag}>" if successor_tag.tag is not None else ""
     advice = "; " + ", ".join(part for part in (replacement, successor_tag.hint) if part)
     version = subject.version or CURRENT_VERSION
+    if version < successor_tag.since:
+        # The tag fits the version, but the reader has not used this element.
+        report(
+            f"<{note.word}> of {describe_object(owner)} is repeated, or is in the wrong place of a "
+            f"file of version {version}: OpenSim ignores it",
+            owner,
+            number=note.number,
+        )
+        return
     report(
         f"<{note.word}> of {describe_object(owner)} belongs to files before version {successor_tag.since}; "
         f"this file has version {version}, so OpenSim ignores it{advice}",

@@ -116,7 +116,10 @@ def read_external_loads(
     elif Path(source).suffix.lower() in TABLES:
         # A table alone does not say where forces act.
         message = "this table does not name the bodies on which its forces act"
-        next_step = "name them with --applied-to (applied_to=), or use a file of ExternalLoads that names this table"
+        next_step = (
+            "use a file of ExternalLoads that names this table; inverse dynamics and static "
+            "optimization also take the bodies from --applied-to (applied_to=)"
+        )
         raise DocumentError(f"{message}: {next_step}", file=str(source))
     else:
         loads = read_object(source, ExternalLoads)
