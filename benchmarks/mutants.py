@@ -2,7 +2,7 @@
 
     python benchmarks/mutants.py --record lines.sqlite
     python benchmarks/mutants.py --lines lines.sqlite --count 200 --seed 1 >quick.txt
-    python benchmarks/mutants.py --lines lines.sqlite --full --again quick.txt
+    python benchmarks/mutants.py --lines lines.sqlite --count 200 --seed 1 --full --again quick.txt
 
 A mutant is the source with one operator, constant or condition changed at random. For each mutant,
 the tests that run its line are called in a copy of the repository, until the first failure. The
@@ -11,8 +11,9 @@ mutant is *killed* if a test fails that passes without it; otherwise it *survive
 The first command runs the quick suite once under coverage and records which tests run which lines.
 Its further arguments go to pytest; records of several folders are merged. The second command tries
 mutants. Without a record, and for a line that no test runs in Python (it may be compiled), the
-tests of the package are called. The third command tries the survivors of the second one again, with
-all tests of the same files, including those of the full suite.
+tests of the package are called. The third command, which needs the same number and seed, tries the
+survivors of the second one again, with all tests of the same files, including those of the full
+suite.
 
 Each mutant has a line with its outcome, the time, the number of tests, and the change; the next
 line has the test that failed. The last line has the number of killed mutants. A mutant of a kernel
@@ -543,6 +544,8 @@ def main() -> int:
     if options.again:
         survivors = read_survivors(options.again)
         mutants = [mutant for mutant in mutants if _describe_mutant(mutant) in survivors]
+        if survivors and not mutants:
+            parser.error(f"{options.again} has other mutants; give its --count and --seed")
     part, parts = map(int, options.part.split("/"))
     counts = try_mutants(
         mutants[part - 1 :: parts], lines, full=options.full, seconds=options.seconds
