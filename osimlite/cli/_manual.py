@@ -87,7 +87,9 @@ PAGES = {
     "osimlite.simulation.engines": "docs/compiled.md",
     "osimlite.io.tables": "docs/forces.md#tables",
     "osimlite.simulation.run_controls": "docs/controls.md#set-controls",
-    "osimlite.simulation.options": "docs/integrators.md",
+    "osimlite.simulation.options": "docs/simulating.md",
+    "osimlite.simulation.options.check_integrator": "docs/integrators.md",
+    "osimlite.simulation.static_optimization": "docs/running-tools.md#muscle-forces",
     "osimlite.simulation.muscle_curves": "docs/muscles.md",
     "osimlite.simulation.paths": "docs/forces.md#paths",
     "osimlite.studies.sweep": "docs/sweeps.md",
@@ -115,10 +117,10 @@ PAGES = {
     "osimlite.translate.mjcf_import": "docs/from-mjcf.md",
     "osimlite.translate.nimble": "docs/addbiomechanics.md#models-made-for-nimblephysics",
     "osimlite.view": "docs/viewer.md",
-    "osimlite.base.result_writing": "docs/errors.md#files",
+    "osimlite.base.result_writing": "docs/running-tools.md#input-and-output-files",
     "osimlite.base.writing": "docs/errors.md#files",
 }
-"""Pages and headings by the class of an error, otherwise by the module or package that raised it.
+"""Pages and headings by the class of an error, otherwise by the function, module or package that raised it.
 
 Modules without a page are skipped for the one that called them.
 """
@@ -127,13 +129,14 @@ Modules without a page are skipped for the one that called them.
 def find_page(error: BaseException) -> str:
     """Return the page of the manual for an exception that was raised."""
     class_names = (f"{cls.__module__}.{cls.__qualname__}" for cls in type(error).__mro__)
-    modules = (
-        frame.f_globals.get("__name__", "")
-        # From the innermost frame outwards: the module that found the problem knows it best.
+    functions = (
+        f"{frame.f_globals.get('__name__', '')}.{frame.f_code.co_name}"
+        # From the innermost frame outwards: the function that found the problem knows it best.
         for frame, _ in reversed([*walk_tb(error.__traceback__)])
     )
-    for name in chain(class_names, modules):
-        # A module without an entry belongs to the page of its package.
+    for name in chain(class_names, functions):
+        # A function without an entry belongs to the page of its module, a module to that of its
+        # package.
         while name:
             if name in PAGES:
                 return PAGES[name]

@@ -117,7 +117,8 @@ def scale(
     for note in result.measured.notes:
         raise SettingError(f"--distance: {note}")
     for name, ratio in result.measured.ratios.items():
-        say(f"{name}: {ratio:.6g}")
+        is_replaced = name.partition(".")[0] in factors
+        say(f"{name}: {ratio:.6g}{', not used because of --factor' if is_replaced else ''}")
     say(f"mass: {result.describe_mass()}")
     if result.placed is not None:
         for _, line in result.placed.describe_pose():

@@ -220,3 +220,11 @@ def test_markers_that_placing_removes_are_named(lab: Path) -> None:
     done = run("scale", "box.osim", "walk.trc", "--place", folder=lab)
     assert (done.code, done.err) == (0, "")
     assert "because the data lack them: three" in " ".join(done.out.split())
+
+
+def test_a_measured_factor_that_a_given_one_replaces_is_marked(lab: Path) -> None:
+    options = ("--distance", "b=one:two", "--factor", "b=2")
+    done = run("scale", "box.osim", "walk.trc", *options, folder=lab)
+    assert done.code == 0 and "b: 1, not used because of --factor" in done.out
+    factor = osimlite.read(lab / "scaled.osim")["/markerset/one"].location[0]
+    assert factor == pytest.approx(2.0 * POINTS["one"][0])

@@ -74,6 +74,7 @@ def test_whatever_raises_errors_has_a_page():
         ("simulate walker.osim --set RHip=1", "docs/simulating.md"),
         ("simulate walker.osim --controls hip=1", "docs/controls.md#set-controls"),
         ("simulate walker.osim --integrator euler", "docs/integrators.md"),
+        ("simulate walker.osim --to -1", "docs/simulating.md"),
         ("sweep walker.osim --vary RHip=0:1", "docs/sweeps.md#variables"),
         (
             "sweep walker.osim --vary RHip_rz=0:1 --samples 2 --measure max(",
