@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ast
 import re
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -42,3 +44,22 @@ def test_a_wrong_expression_is_reported_when_it_is_used() -> None:
         pattern.match("")
     with pytest.raises(AttributeError):
         compile_later("a").unknown  # type: ignore[attr-defined]  # noqa: B018
+
+
+def test_no_group_has_a_possessive_quantifier(repo: Path) -> None:
+    """Python before 3.11.5, as that of Debian 12, matches such groups wrongly (CPython issue 106052)."""
+    possessive_group = re.compile(r"\)(?:[*+?]|\{[0-9,]+\})\+")
+    expressions = {
+        f"{path.name}:{call.lineno}": str(argument.value)
+        for path in sorted((repo / "osimlite").rglob("*.py"))
+        for call in ast.walk(ast.parse(path.read_text()))
+        if isinstance(call, ast.Call)
+        and ast.unparse(call.func)
+        in ("compile_later", "re.compile", "re.sub", "re.match", "re.search")
+        for argument in call.args[:1]
+        if isinstance(argument, ast.Constant)
+    }
+    assert len(expressions) > 100
+    assert {
+        place: text for place, text in expressions.items() if possessive_group.search(text)
+    } == {}

@@ -47,10 +47,11 @@ class Markup(NamedTuple):
 
 
 # Possessive quantifiers, and no match beyond the next "<": the time is linear in the length of any
-# text, also of one that is not XML.
+# text, also of one that is not XML. The group has none, because Python before 3.11.5 matches
+# possessive groups wrongly (CPython issue 106052); its alternatives begin with different characters.
 _MARKUP = compile_later(
     r"<(?:(?P<special>!--|!\[CDATA\[|\?|!DOCTYPE)|/(?P<close>[^\s<>]++)\s*+>|"
-    r"(?P<open>[^\s/<>!?\"']++)(?:[^<>\"'/]++|/(?!>)|\"[^\"<]*+\"|'[^'<]*+')*+(?P<empty>/?)>)"
+    r"(?P<open>[^\s/<>!?\"']++)(?:[^<>\"'/]++|/(?!>)|\"[^\"<]*+\"|'[^'<]*+')*(?P<empty>/?)>)"
 )
 _NAME = compile_later(r"[^\s/<>!?\"'&]++")
 _SPECIAL = {

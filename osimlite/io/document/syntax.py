@@ -45,7 +45,7 @@ _PLAIN = (
 )
 
 
-_PLAIN_DOCTYPE = compile_later(r"<!DOCTYPE(?:[^\[>\"']|\"[^\">]*\"|'[^'>]*'|\[[^\]<>\"']*\])*+>")
+_PLAIN_DOCTYPE = compile_later(r"<!DOCTYPE(?:[^\[>\"']|\"[^\">]*\"|'[^'>]*'|\[[^\]<>\"']*\])*>")
 """DOCTYPE that ends at its first ``>``, so that it declares nothing."""
 
 

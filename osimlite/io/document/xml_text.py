@@ -23,7 +23,7 @@ DIGEST_SIZE = 6
 MANY_ATTRIBUTES = 100
 """Number of attributes from which an element is read by XPath; elements of OpenSim have three."""
 
-_COMMENT = compile_later(rb"<!--([^-]*+(?:-[^-]++)*+)-->")
+_COMMENT = compile_later(rb"<!--([^-]*+(?:-[^-]++)*)-->")
 
 
 @lru_cache(maxsize=4096)

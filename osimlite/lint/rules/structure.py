@@ -408,7 +408,7 @@ def _find_property(subject: Subject, source: Source, number: int) -> FieldSpec |
 
 _SECTION = compile_later(r"<!\[CDATA\[(.*?)\]\]>", re.DOTALL)
 _SECTIONS = compile_later(r"<!\[CDATA\[.*?\]\]>|<!--.*?-->|<\?.*?>", re.DOTALL)
-_OFF = compile_later(r"(?:\s+|(?:unassigned|false|-1(?:\.0*)?|0(?:\.0*)?)(?!\S))*+", re.IGNORECASE)
+_OFF = compile_later(r"(?:\s++|(?:unassigned|false|-1(?:\.0*)?|0(?:\.0*)?)(?!\S))*", re.IGNORECASE)
 _FORMER = {"enable_controller": "enabled"}
 """Names of properties in early releases, which OpenSim does not update in any file."""
 
