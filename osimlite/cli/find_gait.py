@@ -29,7 +29,8 @@ def find_gait(
         Option(
             min=1,
             metavar="N",
-            help="Stop refining walkers when N gait cycles are found. Optimizing the stability finds more.",
+            help="Stop refining walkers when N gait cycles are found. The later optimization of the stability finds "
+            "further cycles.",
         ),
     ] = 5,
     budget: Annotated[

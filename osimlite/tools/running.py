@@ -45,8 +45,6 @@ DEFAULTED = ("OSIM201", "OSIM202")
 
 STUDY = ".omoco"
 """Suffix of Moco studies."""
-NO_OPTION = ", or remove them from the model"
-"""Text that replaces advice about an option that `run` does not have."""
 
 
 class FaultySetup(DocumentError):
@@ -167,10 +165,10 @@ def run(
         outcome.write(file, writer)
     except OsimliteError as error:
         # Importing the simulation here keeps setups that need none fast.
-        from osimlite.simulation.elements.gather import SKIP_ADVICE
+        from osimlite.simulation.elements.gather import REMOVAL_ADVICE, SKIP_ADVICE
 
-        # The advice names an option of other commands, which this function lacks.
-        error.message = error.message.replace(SKIP_ADVICE, NO_OPTION)
+        # ForwardTool runs a simulation, whose options this function lacks.
+        error.message = error.message.replace(SKIP_ADVICE, REMOVAL_ADVICE)
         if isinstance(error, ModelError) and not error.file:
             # The rules for models were not applied; they find more faults, with their positions.
             model_name = str(getattr(setup_object, "model_file", ""))

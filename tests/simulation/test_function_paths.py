@@ -40,7 +40,7 @@ def spring(moment_arm_functions=(), **properties):
         ),
         (
             {"coordinate_paths": TWO, "length_function": Sine()},
-            "function of 1 variable, but gets 2 arguments",
+            "it takes 1 variable, but 2 arguments are listed",
         ),
         (TWICE, "name each once"),
         (
@@ -61,7 +61,7 @@ def spring(moment_arm_functions=(), **properties):
                 "length_function": PLANE,
                 "lengthening_speed_function": PLANE,
             },
-            "'lengthening_speed_function' of .*, but gets 4 arguments",
+            "'lengthening_speed_function' of .* 4 arguments are listed",
         ),
         (
             {

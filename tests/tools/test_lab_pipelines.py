@@ -228,6 +228,13 @@ def test_advice_names_no_option_that_run_lacks(tmp_path: Path, setup: str) -> No
     assert "skip" not in done.err
 
 
+@pytest.mark.parametrize("command", ["static-optimization", "inverse-dynamics"])
+def test_commands_without_the_option_do_not_advise_it(tmp_path: Path, command: str) -> None:
+    done = run(command, "leg.osim", "walk.mot", folder=copy_lab("plugin", tmp_path))
+    assert done.code == 1 and "or remove them from the model" in done.err
+    assert "skip" not in done.err
+
+
 @pytest.mark.parametrize("workers", ["1", "2"])
 def test_warnings_about_results_stand_in_their_rows(tmp_path: Path, workers: str) -> None:
     """Processes of workers printed them as Python does, with a line of code."""

@@ -19,7 +19,7 @@ _SETTINGS: tuple[tuple[str, str, str, Callable[[Any], bool], str], ...] = (
     ("pose-accuracy", "InverseKinematicsToolBase", "accuracy", lambda value: value == 0.0,
      "an accuracy of 0 is never reached"),
     ("few-integrator-steps", "AbstractTool", "maximum_number_of_integrator_steps", lambda value: value < 10,
-     "the run ends after {} steps"),
+     "OpenSim does not apply this limit: the run does not end after {} steps"),
     ("step-interval", "Analysis", "step_interval", lambda value: value < 1, "step_interval is {}, expected 1 or more"),
     ("unnamed-point", "PointKinematics", "point_name", lambda value: not value.strip(),
      "results of a point without a name get no proper file name"),
@@ -95,7 +95,8 @@ _FAULTS = """\
 the search does not end.
 - <accuracy>0.5</accuracy>
 + <accuracy>1e-5</accuracy>
-02 few-integrator-steps, warning, in forward: A tool may take fewer than 10 steps. The run ends early.
+02 few-integrator-steps, warning, in forward: A tool may take fewer than 10 steps. OpenSim 4.6 does not apply this limit;
+the run ends at its final time.
 - <maximum_number_of_integrator_steps>5</maximum_number_of_integrator_steps>
 + <maximum_number_of_integrator_steps>5000</maximum_number_of_integrator_steps>
 03 step-interval, warning, in kinematics: A step interval is below 1. It is the number of steps between two rows.

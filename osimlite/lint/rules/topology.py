@@ -33,7 +33,7 @@ def report_unconnected_body(subject: Subject, report: FindingCollector) -> None:
     OpenSim adds a free joint to ground, and the body falls freely; the finding is then a warning.
     If the body has no mass, OpenSim rejects the model. The added joint can also disturb the order in
     which OpenSim builds other joints, from ground outwards. If offset frames or further joints are
-    on their bodies, OpenSim may then reject the model, or crash.
+    on the bodies of these other joints, OpenSim may then reject the model, or crash.
 
     ```xml
       <Body name="ball"> <mass>1</mass> <inertia>0.1 0.1 0.1 0 0 0</inertia> </Body>

@@ -98,8 +98,8 @@ class _Impossible(Exception):
 def _require_argument_count(function: Object, expected: int, count: int) -> None:
     if count != expected:
         raise _Impossible(
-            f"it is a function of {format_count(expected, 'variable')}, but gets "
-            f"{format_count(count, 'argument')}; use a function of as many variables, or list other coordinates"
+            f"it takes {format_count(expected, 'variable')}, but {format_count(count, 'argument')} are listed; "
+            f"list {expected}, or use a function of {format_count(count, 'variable')}"
         )
 
 

@@ -44,7 +44,7 @@ def force_elements(
     model: Model,
     mechanism: Mechanism,
     *,
-    skip_unsupported: bool = False,
+    skip_unsupported: bool | None = None,
     simbody_early_return: bool = False,
     own_activation_times: bool = False,
     wrapping: str = OPENSIM,
@@ -59,8 +59,9 @@ def force_elements(
     Args:
         model: the model.
         mechanism: mechanism of the same model.
-        skip_unsupported: whether forces that cannot be computed are left out; else they
-            raise an UnsupportedError.
+        skip_unsupported: whether forces that cannot be computed are left out; else they raise an
+            UnsupportedError. None, if the caller has no such option, which the error then does not
+            advise.
         simbody_early_return: whether Simbody's defect in contact of several surfaces is reproduced.
         own_activation_times: whether each DeGrooteFregly2016Muscle uses its own activation times;
             OpenSim's defect shares those of one muscle.
@@ -95,9 +96,10 @@ def force_elements(
             # All unsupported forces are collected, so that one message names them all.
             skipped.append(error.message)
     if skipped and not skip_unsupported:
+        advice = REMOVAL_ADVICE if skip_unsupported is None else SKIP_ADVICE
         raise UnsupportedError(
             f"osimlite cannot compute {join_words(summarize_skipped(skipped))}; set appliesForce of such forces to "
-            f"false{SKIP_ADVICE}"
+            f"false{advice}"
         )
     # External loads come after the forces of the model, as OpenSim adds them to the component set.
     if external_loads is not None:
@@ -114,7 +116,9 @@ def force_elements(
 
 
 SKIP_ADVICE = ", or add --skip-unsupported (skip_unsupported=True) to leave them out"
-"""Advice of commands with the option --skip-unsupported; commands without it remove this from the message."""
+"""Advice of commands and functions with the option --skip-unsupported."""
+REMOVAL_ADVICE = ", or remove them from the model"
+"""Advice of commands and functions without this option."""
 MAX_LISTED_FORCES = 4
 """Up to this number, skipped forces are listed one by one."""
 

@@ -125,7 +125,8 @@ def measure_marker_errors(tool: TrialTool) -> Numbers:
             np.where(np.isfinite(motion.marker_errors), motion.marker_errors, np.nan) ** 2, axis=0
         )
     )
-    worst_note = f"largest: {motion.markers[int(np.nanargmax(rms_by_marker))]}, {100.0 * np.nanmax(rms_by_marker):.3g} cm"
+    worst_marker = motion.markers[int(np.nanargmax(rms_by_marker))]
+    worst_note = f"over all markers; the largest of one marker is {100.0 * np.nanmax(rms_by_marker):.3g} cm, {worst_marker}"
     yield (
         file,
         Measurement(
