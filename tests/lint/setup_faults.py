@@ -544,7 +544,7 @@ HARMLESS = [
         "<socket_actuators>/forceset/hamstrings_r</socket_actuators>\n<enabled>true",
     ),
     Fault(2, "ik.xml", TEXTS["ik.xml"], BARE),
-    Fault(3, "ik.xml", 'Version="40600"', 'Version="99999"'),
+    Fault(3, "ik.xml", 'Version="40600"', 'Version="40000"'),
     Fault(153, "loads.xml", ">ground_torque_<", "><"),
     Fault(156, "loads.xml", "<data_source_name>Unassigned", "<data_source_name>other.mot"),
     Fault(165, "id.xml", "> Muscles<", ">ALL<"),

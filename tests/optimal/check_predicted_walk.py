@@ -115,7 +115,7 @@ def test_a_report_shows_what_was_found(walk):
     told = dict(outcome.messages)
     assert {"effort", "roughness", "objective"} <= {*told}
     near = re.fullmatch(
-        r"within 0\.01 rad or m of the solution until (\S+) s of (\S+) s; at the end \w+ differs by \S+",
+        r"within 0\.01 rad or m of the solution until (\S+) s of (\S+) s; the largest difference at the end is \S+, of '\w+'",
         told["simulated"],
     )
     assert near is not None
