@@ -94,7 +94,9 @@ class Request:
                 "add --motion"
             )
         written_only = {
-            exporter.suffix: exporter for exporter in EXPORTERS if exporter.name not in sources
+            exporter.suffix: exporter
+            for exporter in EXPORTERS
+            if exporter.suffix and exporter.name not in sources
         }
         if source_format is None and file.suffix in written_only:
             exporter = written_only[file.suffix]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from osimlite.base.text import join_words
 from osimlite.cli._console import add_row, create_table
 from osimlite.translate.exporters import EXPORTERS
-from osimlite.translate.importers import OSIM
+from osimlite.translate.importers import OSIM, PROJECT
 
 if TYPE_CHECKING:
     from osimlite.translate.fidelity import Fidelity
@@ -23,7 +23,7 @@ def tabulate(fidelity: Fidelity, target: str) -> Any:
         target: name of the format, as an option has it.
     """
     titles = {exporter.name: exporter.title or exporter.name.upper() for exporter in EXPORTERS}
-    title = (titles | {OSIM: "OpenSim"}).get(target, target)
+    title = (titles | {OSIM: "OpenSim", PROJECT: "the files for OpenSim"}).get(target, target)
     table = create_table(f"Lost or approximated in {title}: {fidelity.model}", padding=(0, 2, 1, 0))
     table.add_column("what", overflow="fold", ratio=4)
     table.add_column("translation", overflow="fold", ratio=3)

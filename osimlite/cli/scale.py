@@ -114,8 +114,8 @@ def scale(
     assert result.measured is not None
     # OpenSim's setups skip such a measurement. On a command line it is a mistake, and the body
     # would keep its size.
-    for note in result.measured.notes:
-        raise SettingError(f"--distance: {note}")
+    if result.measured.notes:
+        raise SettingError(f"--distance: {result.measured.notes[0]}")
     for name, ratio in result.measured.ratios.items():
         is_replaced = name.partition(".")[0] in factors
         say(f"{name}: {ratio:.6g}{', not used because of --factor' if is_replaced else ''}")

@@ -103,10 +103,13 @@ def convert_state(path: str, value: float | str) -> float:
 
 
 def find_suspect_activations(initial: Mapping[str, float | str]) -> dict[str, float]:
-    """Return the values of activations outside 0 to 1 by the paths of their states.
+    """Return the activations that are outside 0 to 1.
 
     Args:
         initial: values by the paths of states and the names of coordinates.
+
+    Returns:
+        Values of these activations by the paths of their states.
     """
     activations = {
         path: convert_state(path, value)

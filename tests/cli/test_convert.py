@@ -71,6 +71,8 @@ def test_formats_are_listed() -> None:
             ("notes.txt",),
             "does not recognize the format of 'notes.txt'; name the format with --from",
         ),
+        (("notes",), "does not recognize the format of 'notes'; name the format with --from"),
+        (("robot.urdf",), "osimlite writes URDF files, but does not read them"),
         (("walk.trc",), "'walk.trc' is a table of OpenSim"),
         (("gone.b3d",), "no such file"),
         (("gone.xml", "--from", "osim", "-o", "walker.osim"), "osimlite upgrade"),
@@ -86,7 +88,7 @@ def test_formats_are_listed() -> None:
 def test_what_cannot_be_converted_is_said_in_one_line(
     walker: Path, words: tuple[str, ...], message: str
 ) -> None:
-    for name in ("notes.txt", "notes.xml", "walk.trc"):
+    for name in ("notes", "notes.txt", "notes.xml", "robot.urdf", "walk.trc"):
         (walker / name).write_text("nothing")
     code, out, error = run("convert", *words, folder=walker)
     assert code == 2 and out == "" and len(error.splitlines()) == 1 and message in error

@@ -59,7 +59,7 @@ def parse_source(source: Source, *, recover: bool = False) -> etree._Element:
 
     Raises:
         NotWellFormedError: the text is not well-formed (without `recover`), or declares entities.
-    """  # noqa: DOC501 - a function makes the error
+    """  # noqa: DOC501 - a function makes the error, which is named
     # lxml gets UTF-8 whatever the text declares, because the encoding was detected before.
     data = source.data if source.encoding in ("utf-8", "utf-8-sig") else source.text.encode()
     # OpenSim knows no namespaces: its parser takes a colon for a part of the name.
@@ -141,7 +141,7 @@ def read_version(source: Source, root: etree._Element) -> int:
     Raises:
         DocumentError: the text is not an OpenSim document.
         VersionError: the version is missing, not a whole number, or too old.
-    """  # noqa: DOC501 - a function makes the error
+    """  # noqa: DOC501 - a function makes the error, which is named
     text = root.get("Version")
     # OpenSim reads a 32-bit integer, which only blanks may follow.
     # `Version="30000 "` is valid for OpenSim, and `Version="3.0"` is not.

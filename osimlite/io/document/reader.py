@@ -284,7 +284,7 @@ def require_stated_version(source: Source) -> None:
     Raises:
         DocumentError: the text is not an OpenSim document.
         VersionError: it has newer content, so its version is wrong.
-    """  # noqa: DOC501 - a function makes the error
+    """  # noqa: DOC501 - a function makes the error, which is named
     from osimlite.io.document.upgrade.newer import find_newer_content
 
     try:
@@ -339,7 +339,7 @@ def _upgrade_tree(source: Source, root: etree._Element, version: int) -> Upgrade
 
     Raises:
         VersionError: some content cannot be upgraded.
-    """  # noqa: DOC501 - a function makes the error
+    """  # noqa: DOC501 - a function makes the error, which is named
     from osimlite.io.document.upgrade import UpgradeError, upgrade
 
     try:
@@ -376,7 +376,7 @@ def _check_leftovers(source: Source, version: int, notes: list[Note]) -> None:
 
     Raises:
         VersionError: the document is older than `FIRST_COMPLETE_VERSION` and has unknown elements.
-    """  # noqa: DOC501 - a function makes the error
+    """  # noqa: DOC501 - a function makes the error, which is named
     unknown_notes = [note for note in notes if note.kind in _UNKNOWN_KINDS]
     if version >= FIRST_COMPLETE_VERSION or not unknown_notes:
         # Newer documents lose what OpenSim loses as well; of older ones nothing is known.
@@ -400,7 +400,7 @@ def _read_top(
 
     Raises:
         DocumentError: the document has no object of the class `expected_class`.
-    """  # noqa: DOC501 - a function makes the error
+    """  # noqa: DOC501 - a function makes the error, which is named
     first_element = find_first_element(root)
     cls = find_tagged_class(first_element)
     if first_element is None or cls is None or not issubclass(cls, expected_class):

@@ -233,9 +233,8 @@ def report_load_place(setup: Setup, report: FindingCollector) -> None:
         if math.hypot(*mean_force) > max(0.5 * mass * weight, 2.0 * lift):
             report(
                 f"the mean sum of these forces, ({', '.join(f'{n:.0f}' for n in mean_force)}) N, does not "
-                "point up, which is opposite to the model's gravity, "
-                f"({', '.join(f'{n:g}' for n in model.gravity)}) m/s^2: check axes and signs of the "
-                "forces, and the gravity",
+                f"point up: the gravity of the model is ({', '.join(f'{n:g}' for n in model.gravity)}) "
+                "m/s^2; check the axes and signs of the forces, and the gravity",
                 loads,
                 tag="datafile",
             )

@@ -93,7 +93,7 @@ def load_mjcf(path: Path) -> MjcfSource:
         MissingFileError: there is no such file.
         DocumentError: MuJoCo rejects the file.
         UnsupportedError: the model has no body, or is larger than osimlite accepts.
-    """  # noqa: DOC501 - a function makes the error
+    """  # noqa: DOC501 - a function makes the error, which is named
     mujoco: Any = require("mujoco", extra="mujoco", purpose="conversion from MJCF")
     if not path.is_file():
         raise MissingFileError("the file does not exist; name an MJCF file (.xml)", file=str(path))
@@ -145,7 +145,7 @@ def _try_in_another_process(path: Path) -> None:
 
     Raises:
         DocumentError: MuJoCo rejects the file, crashes on it, or does not finish in time.
-    """  # noqa: DOC501 - a function makes the error
+    """  # noqa: DOC501 - a function makes the error, which is named
     code = (
         "import sys, mujoco\n"
         "mujoco.set_mju_user_warning(lambda text: None)\n"
