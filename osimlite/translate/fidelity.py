@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Literal
 
@@ -37,8 +38,9 @@ class Error(NamedTuple):
             differences: differences between target and model (k,).
             unit: unit of the differences.
         """
-        magnitudes = np.abs(differences)
-        return cls(float(magnitudes.max()), float(np.sqrt(np.mean(magnitudes**2))), unit)
+        magnitudes = np.abs(differences).ravel().tolist()
+        # Unlike the mean of squares, hypot() does not overflow.
+        return cls(max(magnitudes), math.hypot(*magnitudes) / math.sqrt(len(magnitudes)), unit)
 
 
 @dataclass(frozen=True, slots=True)

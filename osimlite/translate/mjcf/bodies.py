@@ -132,32 +132,31 @@ def _add_inertia(
     draft: MjcfDraft, element: _Element, link: RobotLink, path: str, *, is_moving: bool
 ) -> None:
     """Add mass and inertia of a body, repaired where MuJoCo rejects them."""
-    moments, axes = principal_axes(link.inertia)
+    original, axes = principal_axes(link.inertia)
     mass = link.mass
-    if breaks_triangle_rule(moments):
+    # Bodies that are welded to the world need no mass.
+    least = MIN_MASS if is_moving else 0.0
+    moments = _repair_moments(original, least)
+    if breaks_triangle_rule(original):
         draft.fidelity.add(
             "inertia",
             path,
             "an inertia that no body can have (one principal moment exceeds the sum of the others): MuJoCo stops with "
             "'inertia must satisfy A + B >= C'",
-            "the smallest moment is raised until the inertia is possible (MuJoCo's option balanceinertia "
+            "the smaller moments are raised until the inertia is possible (MuJoCo's option balanceinertia "
             "would set all three to their mean); for the original inertia, set body_inertia of the compiled model",
-            "moments " + ", ".join(f"{moment:g}" for moment in moments) + " kg m^2",
-            {"moment": Error.measure(_repair_moments(moments) - moments, "kg m^2")},
+            "moments " + ", ".join(f"{moment:g}" for moment in original) + " kg m^2",
+            {"moment": Error.measure(moments - original, "kg m^2")},
         )
-    moments = _repair_moments(moments)
-    # Bodies that are welded to the world need no mass.
-    if is_moving and (mass < MIN_MASS or moments.min() < MIN_MASS):
-        if mass < MIN_MASS:
-            draft.fidelity.add(
-                "massless",
-                path,
-                "a moving body without mass: MuJoCo stops with 'mass and inertia of moving bodies must be larger than "
-                "mjMINVAL'",
-                f"a mass of {MIN_MASS:g} kg",
-            )
-        mass = max(mass, MIN_MASS)
-        moments = np.maximum(moments, MIN_MASS)
+    if mass < least:
+        draft.fidelity.add(
+            "massless",
+            path,
+            "a moving body without mass: MuJoCo stops with 'mass and inertia of moving bodies must be larger than "
+            "mjMINVAL'",
+            f"a mass of {MIN_MASS:g} kg",
+        )
+        mass = least
     if mass > 0.0:
         quaternion = clear_rounding(quaternion_of(axes))
         add_element(
@@ -170,17 +169,23 @@ def _add_inertia(
         )
 
 
-def _repair_moments(moments: Array) -> Array:
-    """Raise the smallest principal moment until none exceeds the sum of the others.
+def _repair_moments(moments: Array, least: float) -> Array:
+    """Raise principal moments until MuJoCo accepts them.
 
-    This holds in floating point as well.
+    Moments below `least` are raised to it; then the smallest is raised until none exceeds the sum
+    of the others, also in floating point.
+
+    Args:
+        moments: principal moments (3,), kg·m², of any sign.
+        least: least moment (kg·m²), not negative.
 
     Returns:
         Repaired principal moments (3,), kg·m².
     """
-    repaired = moments.copy()
-    smallest, middle, largest = np.argsort(moments)
-    repaired[smallest] = max(repaired[smallest], repaired[largest] - repaired[middle], 0.0)
+    # Negative moments come first: the rule for the sums holds for the numbers that are written.
+    repaired = np.maximum(moments, least)
+    smallest, middle, largest = np.argsort(repaired)
+    repaired[smallest] = max(repaired[smallest], repaired[largest] - repaired[middle])
     # MuJoCo compares the sum without tolerance, so that rounding must not leave it too small.
     while repaired[smallest] + repaired[middle] < repaired[largest]:
         repaired[smallest] = np.nextafter(repaired[smallest], np.inf)

@@ -18,7 +18,14 @@ from osimlite.schema.muscles import PathActuator
 from osimlite.schema.springs import SpringGeneralizedForce
 from osimlite.simulation.elements.force_types.coordinate_limit import read_limit_constants
 from osimlite.translate.fidelity import Error
-from osimlite.translate.mjcf.draft import Lead, MjcfDraft, Untranslatable, Value, add_element
+from osimlite.translate.mjcf.draft import (
+    Lead,
+    MjcfDraft,
+    Untranslatable,
+    Value,
+    add_element,
+    format_spring_length,
+)
 
 UNREACHABLE_VALUE = 1e6
 """Value (rad or m) that no coordinate reaches, for the side on which a one-sided spring is slack."""
@@ -174,10 +181,10 @@ def _add_tendon(
     """
     slope, start = leader.line
     # The length of the tendon is the coordinate plus start / slope.
-    spring_range = [end + start / slope for end in slack]
+    spring_length = format_spring_length(*(end + start / slope for end in slack))
     name = draft.make_name("tendon", path)
     tendon = add_element(
-        draft.get_section("tendon"), "fixed", name=name, springlength=spring_range, **law
+        draft.get_section("tendon"), "fixed", name=name, springlength=spring_length, **law
     )
     add_element(tendon, "joint", joint=leader.joint, coef=1.0 / slope)
     return f"tendon {name}"

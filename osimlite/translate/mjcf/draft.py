@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -466,6 +467,20 @@ def format_pose(matrix: Array) -> dict[str, Value]:
 def clear_rounding(values: Array) -> Array:
     """Return numbers in which rounding errors around 0 are 0, so that the file is easy to read."""
     return np.where(np.abs(values) < 1e-16, 0.0, values)
+
+
+def format_spring_length(low: float, high: float) -> str:
+    """Return the lengths of a tendon between which its spring is slack, as text.
+
+    Args:
+        low: lower end, m or rad.
+        high: upper end, m or rad; MuJoCo rejects one below `low`, which is lowered to it.
+    """
+    low = min(low, high)
+    # For MuJoCo two times -1 means the length in its default pose.
+    if low == high == -1.0:
+        high = math.nextafter(-1.0, 0.0)
+    return format_value((low, high))
 
 
 def format_value(value: str | bool | int | float | Sequence[float] | Array) -> str:

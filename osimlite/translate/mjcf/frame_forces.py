@@ -15,7 +15,14 @@ from osimlite.schema.actuators import (
 from osimlite.schema.base import Component
 from osimlite.schema.fields import Vec3
 from osimlite.schema.springs import BushingForce, PointToPointSpring
-from osimlite.translate.mjcf.draft import SPECK_MASS_KG, MjcfDraft, Untranslatable, add_element
+from osimlite.translate.mjcf.draft import (
+    SPECK_MASS_KG,
+    MjcfDraft,
+    Untranslatable,
+    Value,
+    add_element,
+    format_spring_length,
+)
 
 GROUND_FRAME = FramePlacement(GROUND, np.eye(4))
 """Frame of ground."""
@@ -39,7 +46,14 @@ def add_point_spring(draft: MjcfDraft, force: PointToPointSpring, path: str) -> 
         _add_point_site(draft, force, path, "socket_body1", force.point1),
         _add_point_site(draft, force, path, "socket_body2", force.point2),
     ]
-    return f"tendon {add_straight_tendon(draft, path, site_names, stiffness=force.stiffness, springlength=force.rest_length)}"
+    tendon = add_straight_tendon(
+        draft,
+        path,
+        site_names,
+        stiffness=force.stiffness,
+        springlength=format_spring_length(force.rest_length, force.rest_length),
+    )
+    return f"tendon {tendon}"
 
 
 def add_point_to_point_actuator(draft: MjcfDraft, force: PointToPointActuator, path: str) -> str:
@@ -130,7 +144,7 @@ def add_point_actuator(draft: MjcfDraft, force: PointActuator, path: str) -> str
     )
 
 
-def add_straight_tendon(draft: MjcfDraft, path: str, sites: list[str], **law: float) -> str:
+def add_straight_tendon(draft: MjcfDraft, path: str, sites: list[str], **law: Value) -> str:
     """Add a tendon through sites.
 
     Args:

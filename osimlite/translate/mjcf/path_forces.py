@@ -11,7 +11,13 @@ from osimlite.schema.muscles import PathActuator
 from osimlite.schema.path_forces import Blankevoort1991Ligament, Ligament, PathSpring
 from osimlite.translate.fidelity import Error
 from osimlite.translate.mjcf.coordinate_forces import add_scaled_actuator
-from osimlite.translate.mjcf.draft import MjcfDraft, PathTendon, Untranslatable, format_value
+from osimlite.translate.mjcf.draft import (
+    MjcfDraft,
+    PathTendon,
+    Untranslatable,
+    format_spring_length,
+    format_value,
+)
 from osimlite.translate.mjcf.isometric import compute_isometric_tension
 
 
@@ -54,7 +60,7 @@ def add_spring(draft: MjcfDraft, force: PathSpring, path: str) -> str:
         {
             "stiffness": format_value(force.stiffness),
             # Between 0 and the rest length the spring of MuJoCo is slack.
-            "springlength": format_value((0.0, force.resting_length)),
+            "springlength": format_spring_length(0.0, force.resting_length),
         }
     )
     draft.record_result(path, f"tendon {path_tendon.name}")
@@ -89,7 +95,10 @@ def add_ligament(draft: MjcfDraft, force: Ligament | Blankevoort1991Ligament, pa
     # Slack poses are left out: a spring that fits them too would be too soft.
     stiffness, rest_length = _fit_spring(path_tendon.lengths[tension > 0.0], tension[tension > 0.0])
     element.attrib.update(
-        {"stiffness": format_value(stiffness), "springlength": format_value((0.0, rest_length))}
+        {
+            "stiffness": format_value(stiffness),
+            "springlength": format_spring_length(0.0, rest_length),
+        }
     )
     draft.record_result(path, f"tendon {path_tendon.name}")
     draft.fidelity.add(

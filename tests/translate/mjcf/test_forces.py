@@ -13,7 +13,9 @@ from osimlite import (
     BushingForce,
     CoordinateActuator,
     CoordinateLimitForce,
+    GeometryPath,
     Model,
+    PathSpring,
     PointActuator,
     PointToPointActuator,
     PointToPointSpring,
@@ -63,6 +65,14 @@ def both(model: Model, q, u, control: float = 0.7) -> tuple[np.ndarray, np.ndarr
     return (data.qfrc_passive + data.qfrc_actuator)[order], wanted
 
 
+def make_path(*points: tuple[str, tuple[float, float, float]]) -> GeometryPath:
+    """Return a path through points, each a frame and a position in it (m)."""
+    path = GeometryPath(name="path")
+    for frame, location in points:
+        path.add_point(frame, location)
+    return path
+
+
 FORCES = {
     "coordinate": CoordinateActuator(
         name="f", coordinate="q1", optimal_force=12.0, min_control=-1, max_control=1
@@ -71,6 +81,9 @@ FORCES = {
     "spring": SpringGeneralizedForce(
         name="f", coordinate="q2", stiffness=30.0, rest_length=0.1, viscosity=2.0
     ),
+    "spring at rest at -1": SpringGeneralizedForce(
+        name="f", coordinate="q2", stiffness=30.0, rest_length=-1.0
+    ),
     "points": PointToPointSpring(
         name="f",
         socket_body1=A,
@@ -78,6 +91,21 @@ FORCES = {
         point1=(0.1, 0, 0.3),
         stiffness=80.0,
         rest_length=0.2,
+    ),
+    "points with a negative rest length": PointToPointSpring(
+        name="f",
+        socket_body1=A,
+        socket_body2="/componentset/hook",
+        point1=(0.1, 0, 0.3),
+        stiffness=80.0,
+        rest_length=-1.0,
+    ),
+    "path with a negative resting length": PathSpring(
+        name="f",
+        geometry_path=make_path((A, (0.1, 0.0, 0.3)), (B, (0.0, 0.1, 0.0))),
+        resting_length=-0.3,
+        stiffness=80.0,
+        dissipation=0.0,
     ),
     "apart": PointToPointActuator(
         name="f", bodyA="b1", bodyB="b3", pointA=(0.1, 0.2, 0), optimal_force=50.0

@@ -13,14 +13,14 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 import osimlite
-from osimlite import CoordinateCouplerConstraint, CustomJoint, Model
+from osimlite import CoordinateCouplerConstraint, CustomJoint, Model, PinJoint, WeldJoint
 from osimlite.errors import ModelError, OsimliteError
 from osimlite.schema.base import Object
 from osimlite.schema.geometry import Geometry
 from osimlite.schema.geometry_types import Brick, Cylinder, Ellipsoid, Sphere
 from osimlite.schema.millard_muscles import Millard2012EquilibriumMuscle
 from osimlite.schema.splines import SimmSpline
-from tests.simple_models import make_pendulum
+from tests.simple_models import make_pendulum, make_single_body
 from tests.translate.mjcf.support import HOSTILE, hostile
 
 FIXTURES = Path(__file__).resolve().parents[3] / "fixtures"
@@ -112,6 +112,23 @@ def test_mujoco_takes_models_with_any_numbers(
         except ValidationError:
             assume(False)
     taken(model, **options)
+
+
+@given(st.lists(NUMBERS, min_size=3, max_size=6), NUMBERS)
+@example([-1e308, -1e308, 0.05], 11.0)
+@example([-2.0, -1.0, 0.05], 1.0)
+@example([-2.0, -1.0, -1.0], 1.0)
+@example([1e308, 1e308, 1e308], 1.0)
+@example([1e308, 0.0, -1e308], 1.0)
+@example([1.0, 1.0, 1.0, 1e308, 1e308, 1e308], 1.0)
+@example([0.1, 0.3, 0.4], 1e-320)
+def test_mujoco_takes_bodies_of_any_inertia(inertia: list[float], mass: float) -> None:
+    for joint in (PinJoint(name="joint"), WeldJoint(name="joint")):
+        model = make_single_body(joint, body="bob")
+        body = model["/bodyset/bob"]
+        body.inertia = (*inertia, *[0.0] * (6 - len(inertia)))
+        body.mass = mass
+        taken(model)
 
 
 @given(st.sampled_from(("radius", "flat", "brick", "thin", "low", "scale", "color")), NUMBERS)
