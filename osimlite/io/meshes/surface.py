@@ -59,6 +59,10 @@ class Surface:
             normals = normals / np.where(lengths > 0.0, lengths, 1.0)
         return Surface(self.points * np.array(factors), triangles, normals, self.is_closed)
 
+    def list_corners(self) -> Array:
+        """Return the corners (t, 3, 3) of the triangles."""
+        return self.points[self.triangles]
+
     def obj(self) -> str:
         """Return the surface as the text of an OBJ file."""
         lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in self.points.tolist()]

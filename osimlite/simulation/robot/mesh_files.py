@@ -8,8 +8,8 @@ from osimlite.base.files import MESH_FOLDER_HINT, read_file
 from osimlite.base.records import dataclass, field
 from osimlite.errors import OsimliteError
 from osimlite.io.meshes.folders import MeshFolders, read_surface
-from osimlite.io.meshes.stl import format_binary_stl, is_binary
-from osimlite.io.meshes.surface import Surface
+from osimlite.io.meshes.stl import format_binary_stl, is_binary, read_stl_corners
+from osimlite.io.meshes.surface import Array, Surface
 from osimlite.simulation.robot.names import legal
 
 MESH_FOLDER = "meshes"
@@ -51,10 +51,12 @@ class MeshFiles:
     Attributes:
         folders: folders in which the files are searched.
         files: contents by name relative to the robot's own file.
+        corners: corners (t, 3, 3) of the t triangles of each file, m, by the same name.
     """
 
     folders: MeshFolders = field(default_factory=MeshFolders)
     files: dict[str, bytes] = field(default_factory=dict)
+    corners: dict[str, Array] = field(default_factory=dict)
     _made: dict[tuple[object, ...], str] = field(default_factory=dict)
 
     def copy(self, name: str, signs: Signs = (1.0, 1.0, 1.0)) -> MeshCopy:
@@ -83,10 +85,10 @@ class MeshFiles:
                     "left out: the file is neither beside the model, nor in its folder Geometry, nor in the folders "
                     f"named {MESH_FOLDER_HINT}"
                 )
-            content, converted = _convert_mesh(source, kind, signs)
+            content, corners, converted = _convert_mesh(source, kind, signs)
         except OsimliteError as error:
             raise MeshProblem(f"left out: {error}") from None
-        file = self.add((str(source), signs), source.stem, _WRITTEN[kind], content)
+        file = self.add((str(source), signs), source.stem, _WRITTEN[kind], content, corners)
         # The file was found in another letter case.
         misspelt = not source.as_posix().endswith(Path(name).as_posix().removeprefix("./"))
         return MeshCopy(file, source, converted, misspelt)
@@ -102,9 +104,14 @@ class MeshFiles:
         Returns:
             Name relative to the robot's own file.
         """
-        return self.add((name, *size), name, ".obj", shape.stretch(size).obj().encode())
+        stretched = shape.stretch(size)
+        return self.add(
+            (name, *size), name, ".obj", stretched.obj().encode(), stretched.list_corners()
+        )
 
-    def add(self, key: tuple[object, ...], stem: str, kind: str, content: bytes) -> str:
+    def add(
+        self, key: tuple[object, ...], stem: str, kind: str, content: bytes, corners: Array
+    ) -> str:
         """Return the name of a mesh file, and add the file if it is new.
 
         Args:
@@ -112,6 +119,7 @@ class MeshFiles:
             stem: name without suffix.
             kind: suffix.
             content: content of the file.
+            corners: corners (t, 3, 3) of its triangles, m.
 
         Returns:
             Name relative to the robot's own file. It differs from all others even where capitals do
@@ -128,10 +136,11 @@ class MeshFiles:
                 name = f"{base}_{count}{kind}"
             self._made[key] = name
             self.files[name] = content
+            self.corners[name] = corners
         return self._made[key]
 
 
-def _convert_mesh(source: Path, kind: str, signs: Signs) -> tuple[bytes, str]:
+def _convert_mesh(source: Path, kind: str, signs: Signs) -> tuple[bytes, Array, str]:
     """Return the content of a converted mesh file.
 
     Args:
@@ -140,13 +149,17 @@ def _convert_mesh(source: Path, kind: str, signs: Signs) -> tuple[bytes, str]:
         signs: signs of the scale factors.
 
     Returns:
-        Content, and a phrase that says what was converted, or "".
+        Content, corners (t, 3, 3) of the triangles, and a phrase that says what was converted, or
+        "".
     """
     if kind == ".stl":
         content = read_file(source)
         binary = format_binary_stl(content, source.name, signs)
-        return binary, "" if is_binary(content) else "written as a binary STL file"
+        corners = read_stl_corners(binary, source.name)
+        return binary, corners, "" if is_binary(content) else "written as a binary STL file"
     surface = read_surface(source)
     # Mirrored triangles must be turned around, which a scale in URDF does not do.
-    text = (surface.stretch(signs) if min(signs) < 0.0 else surface).obj().encode()
-    return text, "written as an OBJ file of triangles" if kind == ".vtp" else ""
+    if min(signs) < 0.0:
+        surface = surface.stretch(signs)
+    converted = "written as an OBJ file of triangles" if kind == ".vtp" else ""
+    return surface.obj().encode(), surface.list_corners(), converted

@@ -37,6 +37,12 @@ ContactForce = HuntCrossleyForce | ElasticFoundationForce | SmoothSphereHalfSpac
 """Contact forces that become pairs of geoms."""
 
 
+MIN_RELATIVE_THICKNESS = 1e-12
+"""Least thickness of a contact mesh, over its largest coordinate: MuJoCo finds no convex hull of a
+flat one, and rounding limits what it calls flat.
+"""
+
+
 def add_contacts(draft: MjcfDraft) -> None:
     """Add contact surfaces, and a pair for any two surfaces that a contact force connects."""
     surfaces = list(draft.iterate_components(ContactGeometry))
@@ -66,6 +72,10 @@ def add_contacts(draft: MjcfDraft) -> None:
             pair_names = " ".join(_add_pairs(draft, force))
         except ModelError as error:
             draft.fidelity.add("contact", path, description, f"{LEFT_OUT}: {error}")
+            continue
+        if not pair_names:
+            done = f"{LEFT_OUT}: no two of its surfaces on different bodies are in the file"
+            draft.fidelity.add("contact", path, description, done)
             continue
         replacement = "MuJoCo's contact law: it supports the bodies, but forces and motions differ"
         draft.fidelity.add("contact", path, description, replacement, f"pairs {pair_names}")
@@ -121,11 +131,29 @@ def _make_geom(
             shape = mesh_shape(geometry.filename, path, draft.mesh_files, draft.fidelity.add)
             if shape is None:
                 return None
+            _require_thickness(draft.mesh_files.corners[shape.file])
+            mesh = draft.add_mesh(shape.file, shape.scale)
             draft.fidelity.add(
                 "contact-geometry", path, "a contact mesh", "its convex hull", shape.file
             )
-            return {"type": "mesh", "mesh": draft.add_mesh(shape.file, shape.scale)}, np.eye(4)
+            return {"type": "mesh", "mesh": mesh}, np.eye(4)
     raise Untranslatable("MuJoCo has no such surface")
+
+
+def _require_thickness(corners: Array) -> None:
+    """Check that a contact mesh has a convex hull.
+
+    Args:
+        corners: corners (t, 3, 3) of its triangles, m.
+
+    Raises:
+        Untranslatable: all corners are in one plane.
+    """
+    points = corners.reshape(-1, 3)
+    centered_points = points - points.mean(axis=0)
+    thickness = float(np.linalg.svd(centered_points, compute_uv=False)[-1])
+    if thickness <= MIN_RELATIVE_THICKNESS * float(np.abs(points).max()):
+        raise Untranslatable("its corners are in one plane, so that it has no convex hull")
 
 
 def _add_pairs(draft: MjcfDraft, force: ContactForce) -> Iterator[str]:

@@ -45,6 +45,12 @@ Value = str | bool | int | float | Sequence[float] | Array | None
 """Value of an attribute; None leaves the attribute out."""
 C = TypeVar("C", bound=Component)
 
+MIN_MESH_CORNERS = 4
+"""Fewest different corners of a mesh that MuJoCo accepts, also for one that is only drawn."""
+
+MIN_MESH_AREA_M2 = 1e-14
+"""Least area of a mesh that is written (m²): MuJoCo requires 1e-15, and computes with rounded corners."""
+
 SPECK_MASS_KG = 1e-3
 """Mass (kg) of a body that exists for a constraint only.
 
@@ -428,9 +434,13 @@ class MjcfDraft:
         Args:
             file: name of the mesh file.
             scale: scale along x, y and z.
+
+        Raises:
+            Untranslatable: MuJoCo rejects such a mesh.
         """
         key = (file, scale)
         if key not in self._meshes:
+            _require_area(self.mesh_files.corners[file] * np.array(scale))
             name = self._meshes[key] = self.make_name("mesh", Path(file).stem)
             size = None if scale == (1.0, 1.0, 1.0) else scale
             add_element(
@@ -462,6 +472,30 @@ def format_pose(matrix: Array) -> dict[str, Value]:
         "pos": position if position.any() else None,
         "quat": quaternion if quaternion[1:].any() else None,
     }
+
+
+def _require_area(corners: Array) -> None:
+    """Check that MuJoCo accepts a mesh.
+
+    Args:
+        corners: corners (t, 3, 3) of its triangles, m.
+
+    Raises:
+        Untranslatable: it has too few corners, or no area.
+    """
+    corner_count = len(np.unique(corners.reshape(-1, 3), axis=0))
+    if corner_count < MIN_MESH_CORNERS:
+        raise Untranslatable(
+            f"MuJoCo rejects meshes of fewer than {MIN_MESH_CORNERS} different corners "
+            f"({corner_count} here)"
+        )
+    first_edges = corners[:, 1] - corners[:, 0]
+    second_edges = corners[:, 2] - corners[:, 0]
+    area = 0.5 * float(np.linalg.norm(np.cross(first_edges, second_edges), axis=1).sum())
+    if area < MIN_MESH_AREA_M2:
+        raise Untranslatable(
+            f"MuJoCo rejects meshes of less than {MIN_MESH_AREA_M2:g} m^2 ({area:g} m^2 here)"
+        )
 
 
 def clear_rounding(values: Array) -> Array:

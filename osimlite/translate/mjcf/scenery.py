@@ -6,7 +6,14 @@ import numpy as np
 
 from osimlite.mechanics.multibody.spatial import cross
 from osimlite.simulation.robot.robot import Ball, Box, MeshFile, Tube, Visual
-from osimlite.translate.mjcf.draft import MjcfDraft, Value, add_element, format_pose
+from osimlite.translate.fidelity import LEFT_OUT
+from osimlite.translate.mjcf.draft import (
+    MjcfDraft,
+    Untranslatable,
+    Value,
+    add_element,
+    format_pose,
+)
 
 SHAPE_GROUP = 2
 """Group of shapes; MuJoCo's viewer shows or hides a group at a time, and shows 0 to 2 at first."""
@@ -28,6 +35,11 @@ def add_shapes(draft: MjcfDraft) -> None:
     add_element(shape_default, "geom", contype=0, conaffinity=0, group=SHAPE_GROUP, mass=0)
     for link, element in draft.iterate_links():
         for visual in link.visuals:
+            try:
+                shape = format_shape(draft, visual)
+            except Untranslatable as error:
+                draft.fidelity.add("visual", visual.source, "a mesh", f"{LEFT_OUT}: {error}")
+                continue
             name = draft.make_name("geom", visual.source)
             add_element(
                 element,
@@ -36,7 +48,7 @@ def add_shapes(draft: MjcfDraft) -> None:
                 name=name,
                 rgba=visual.color,
                 **format_pose(visual.origin),
-                **format_shape(draft, visual),
+                **shape,
             )
             draft.fidelity.translated[visual.source] = f"geom {name}"
 
@@ -99,6 +111,9 @@ def format_shape(draft: MjcfDraft, visual: Visual) -> dict[str, Value]:
 
     Returns:
         Attributes by name.
+
+    Raises:
+        Untranslatable: MuJoCo rejects the mesh.
     """
     match visual.shape:
         case Box(size):
