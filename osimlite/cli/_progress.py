@@ -139,7 +139,7 @@ def _format_duration(seconds: float) -> str:
     return f"{seconds / 60.0:.0f} min" if seconds < 6000.0 else f"{seconds / 3600.0:.1f} h"
 
 
-class _Line:
+class ProgressLine:
     """The line on standard error; it is erased before anything else is printed."""
 
     def __init__(self) -> None:
@@ -242,8 +242,8 @@ class _Line:
             stream.flush()
 
 
-_line = _Line()
-_stack = ExitStack()
+progress_line = ProgressLine()
+listeners = ExitStack()
 """Listeners of the command."""
 _is_listening = False
 """Whether reports of the library are passed on."""
@@ -252,10 +252,10 @@ _is_listening = False
 def watch_command(name: str) -> None:
     """Show the progress of a command while it prints nothing, at a terminal only."""
     if name not in INTERACTIVE:
-        _line.tasks.append(_Task(ACTIVITIES.get(name, "working"), None))
-        _line.hasten()
-        _stack.enter_context(_listen())
-        _line.start()
+        progress_line.tasks.append(_Task(ACTIVITIES.get(name, "working"), None))
+        progress_line.hasten()
+        listeners.enter_context(_listen())
+        progress_line.start()
 
 
 @contextmanager
@@ -269,7 +269,7 @@ def _listen() -> Iterator[None]:
 
     _is_listening = True
     try:
-        with listen_to_progress(_line.receive):
+        with listen_to_progress(progress_line.receive):
             yield
     finally:
         _is_listening = False
@@ -277,9 +277,9 @@ def _listen() -> Iterator[None]:
 
 def finish_command() -> None:
     """Remove the line at the end of the program, or when it only waits for people."""
-    _stack.close()
-    _line.tasks.clear()
-    _line.erase()
+    listeners.close()
+    progress_line.tasks.clear()
+    progress_line.erase()
 
 
 @contextmanager
@@ -299,7 +299,7 @@ def progress_bar(title: str, total: float | None, unit: str = "") -> Iterator[Ca
         text, or a function that returns it for the amount finished per second.
     """
     task = _Task(title, total, unit)
-    _line.tasks.append(task)
+    progress_line.tasks.append(task)
 
     def advance(done: float, of: float | None = None, more: Any = None) -> None:
         task.done = float(done)
@@ -312,16 +312,16 @@ def progress_bar(title: str, total: float | None, unit: str = "") -> Iterator[Ca
             task.details = more(task.done / elapsed) if callable(more) else str(more)
         # Reports of the library on the finished item do not belong to the next one.
         task.part = task.stage = None
-        _line.update(task)
+        progress_line.update(task)
 
     try:
         with _listen():
             yield advance
     finally:
         # `watch_command` may have removed all tasks at the end of the program.
-        if task in _line.tasks:
-            _line.tasks.remove(task)
-        _line.erase()
+        if task in progress_line.tasks:
+            progress_line.tasks.remove(task)
+        progress_line.erase()
     if task.is_announced:
         complain(f"{title}: finished in {_format_duration(time.monotonic() - task.started)}")
 
@@ -369,10 +369,12 @@ def show_engine_warnings() -> None:
                 complain(record.getMessage())
             # Compiling takes seconds on the first run, which people should not take for the
             # simulation.
-            elif _line.tasks:
+            elif progress_line.tasks:
                 message = record.getMessage()
                 is_finished = not message.startswith("compiling")
-                _line.tasks[-1].details = "" if is_finished else f"{message} (once per machine)"
+                progress_line.tasks[-1].details = (
+                    "" if is_finished else f"{message} (once per machine)"
+                )
 
     log = logging.getLogger("osimlite.simulation.engines")
     log.addHandler(ProgressHandler())

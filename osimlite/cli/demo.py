@@ -79,7 +79,7 @@ def demo(
     engine_factory("compiled")
     if pictures:
         require("matplotlib", extra="plot", purpose="drawing")
-    tour = _Tour(output)
+    tour = Tour(output)
     _build_and_check(tour)
     pages = _simulate_motions(tour, pictures)
     say(f"Everything is in {output}{os.sep}")
@@ -93,7 +93,7 @@ def demo(
 
 
 @dataclass
-class _Tour:
+class Tour:
     """Output folder of the tour, and the number of steps so far."""
 
     folder: Path
@@ -125,7 +125,7 @@ class _Tour:
             yield print_result
 
 
-def _build_and_check(tour: _Tour) -> None:
+def _build_and_check(tour: Tour) -> None:
     """Build the walker of the exercise, validate it and a misspelt copy, and translate it."""
     from osimlite.base.files import make_folder, write_atomically
     from osimlite.io.document.printer import write
@@ -164,7 +164,7 @@ def _build_and_check(tour: _Tour) -> None:
         )
 
 
-def _simulate_motions(tour: _Tour, pictures: bool) -> Sequence[Path]:
+def _simulate_motions(tour: Tour, pictures: bool) -> Sequence[Path]:
     """Simulate the three models, and write plots and pages.
 
     Returns:
@@ -244,7 +244,7 @@ def _simulate_motions(tour: _Tour, pictures: bool) -> Sequence[Path]:
     return pages
 
 
-def _compare_engines(tour: _Tour, compiled: Trajectory) -> None:
+def _compare_engines(tour: Tour, compiled: Trajectory) -> None:
     """Simulate the walker with PyBullet as well, if installed, and print the difference of the motions."""
     from importlib.util import find_spec
 
@@ -294,7 +294,7 @@ def _count_steps(motion: Trajectory) -> int:
     return int(motion.summary["steps"])
 
 
-def _simulate_walking(tour: _Tour) -> tuple[Scenario, Path, str]:
+def _simulate_walking(tour: Tour) -> tuple[Scenario, Path, str]:
     """Simulate the human model walking by reflexes.
 
     Returns:

@@ -93,7 +93,7 @@ class DualMachine:
                 )
         # States are never projected onto constraints here.
         laws = tuple(name for name in packed.laws if name != "project")
-        self.program = Program(replace(packed, laws=laws), _load_tangent_code(), entries)
+        self.program = Program(replace(packed, laws=laws), load_tangent_code(), entries)
         # Dual numbers as rows: the value first, then the derivatives along each direction.
         self.x = np.zeros((len(packed.numbers), 1 + DIRECTIONS))
         self.x[:, 0] = packed.numbers
@@ -565,6 +565,6 @@ def split_directions(count: int) -> Iterator[tuple[slice, slice]]:
 
 
 @cache
-def _load_tangent_code() -> Tangents:
+def load_tangent_code() -> Tangents:
     """Return the machine code for `DIRECTIONS` directions."""
     return Tangents(DIRECTIONS)

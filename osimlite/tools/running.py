@@ -137,7 +137,7 @@ def run(
     if check:
         report_stage("checking the setup")
         current_folder_files: dict[str, None] = {}
-        report = merge_reports(_check_documents(str(file), current_folder_files))
+        report = merge_reports(check_documents(str(file), current_folder_files))
         # OpenSim runs setups with some errors, and errors about replaced inputs do not matter.
         if errors := [
             e for e in report.errors if not (_is_run_by_opensim(e) or _is_about_any(e, replaced))
@@ -241,7 +241,7 @@ def list_runnable() -> list[str]:
     return [class_name for class_name in MODULES if class_name in TOOLS]
 
 
-def _check_documents(setup: str, current_folder_files: dict[str, None]) -> Iterator[Report]:
+def check_documents(setup: str, current_folder_files: dict[str, None]) -> Iterator[Report]:
     """Yield reports on a document and on documents and tables that it names, without models.
 
     Args:

@@ -143,11 +143,11 @@ def _draw_lines(
             _draw_pairs(panel, abscissa, pairs, columns, other_columns, sides)
             panel.set_title(region, fontsize=10, loc="left")
             style_axes(panel, label)
-            _widen_constant(panel)
+            widen_constant_range(panel)
         yield figure
 
 
-def _widen_constant(panel: Any) -> None:
+def widen_constant_range(panel: Any) -> None:
     """Widen the range of a panel whose curves are constant, so that rounding errors do not show."""
     lowest, highest = panel.dataLim.intervaly
     size = max(abs(lowest), abs(highest))

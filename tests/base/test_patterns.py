@@ -21,7 +21,9 @@ def test_a_pattern_is_compiled_once_when_it_is_used(monkeypatch: pytest.MonkeyPa
     pattern: Any = compile_later("(?P<letter>a)", re.IGNORECASE)
     assert pattern.fullmatch("A")["letter"] == "A"
     assert pattern.fullmatch is pattern.fullmatch
-    assert pattern._compiled is pattern._compiled
+    with monkeypatch.context() as context:
+        context.setattr(re, "compile", None)
+        assert pattern.groups == 1
 
 
 def test_methods_and_attributes_are_those_of_the_compiled_pattern() -> None:

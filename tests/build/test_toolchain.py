@@ -8,7 +8,7 @@ import pytest
 
 from osimlite.mechanics.codegen import toolchain
 from osimlite.mechanics.codegen.processor import X86_64_V3 as V3_FEATURES
-from osimlite.mechanics.codegen.processor import _read_cpuinfo
+from osimlite.mechanics.codegen.processor import read_cpuinfo
 from osimlite.mechanics.codegen.toolchain import (
     BASELINE,
     NATIVE,
@@ -30,7 +30,7 @@ def programs(tmp_path, monkeypatch):
         pytest.skip("the programs are scripts of a shell")
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.delenv("CXX", raising=False)
-    monkeypatch.setattr(toolchain, "_has_developer_tools", lambda: True)
+    monkeypatch.setattr(toolchain, "has_developer_tools", lambda: True)
     find_compiler.cache_clear()
 
     def add(name, version, code=0):
@@ -111,8 +111,8 @@ def test_an_error_of_the_compiler_is_one_sentence(programs, tmp_path):
 def test_features_of_a_processor(tmp_path):
     file = tmp_path / "cpuinfo"
     file.write_text("processor\t: 0\nflags\t\t: fpu sse2 avx2\nbugs\t\t: none\n")
-    assert _read_cpuinfo(str(file)) == {"fpu", "sse2", "avx2"}
+    assert read_cpuinfo(str(file)) == {"fpu", "sse2", "avx2"}
     file.write_text("processor\t: 0\nFeatures\t: fp asimd\n")
-    assert _read_cpuinfo(str(file)) == {"fp", "asimd"}
-    assert _read_cpuinfo(str(tmp_path / "none")) == frozenset()
+    assert read_cpuinfo(str(file)) == {"fp", "asimd"}
+    assert read_cpuinfo(str(tmp_path / "none")) == frozenset()
     assert "avx2" in V3_FEATURES

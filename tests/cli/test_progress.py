@@ -37,9 +37,9 @@ def clock(monkeypatch):
     monkeypatch.setattr(_progress, "time", clock)
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setenv("COLUMNS", "80")
-    line = _progress._Line()
-    monkeypatch.setattr(_progress, "_line", line)
-    monkeypatch.setattr(_progress, "_stack", _progress.ExitStack())
+    line = _progress.ProgressLine()
+    monkeypatch.setattr(_progress, "progress_line", line)
+    monkeypatch.setattr(_progress, "listeners", _progress.ExitStack())
     monkeypatch.setattr(line, "start", lambda: _console.set_output_hook(line.make_way))
     yield clock
     _console.set_output_hook(None)
@@ -79,7 +79,7 @@ def test_the_amount_is_told_before_the_first_part_is_done(monkeypatch, clock):
     monkeypatch.setattr(sys, "stderr", Terminal())
     with progress_bar("sweeping", 40.0):
         clock.now = 3.0
-        _progress._line.draw()
+        _progress.progress_line.draw()
         assert shown(sys.stderr) == "sweeping: 0 % (0 of 40), 3 s"
 
 
@@ -100,7 +100,7 @@ def test_the_line_is_removed_with_what_the_terminal_writes_behind_it(monkeypatch
             progress(0.0, None, words)
         longest = max(map(len, sys.stderr.getvalue().split("\r")))
         # The blanks are longer than the line: the terminal may have written ^C behind it.
-        _progress._line.erase()
+        _progress.progress_line.erase()
         assert sys.stderr.getvalue().endswith(f"\r{'':{longest + 2}}\r")
 
 
@@ -108,18 +108,18 @@ def test_output_removes_the_line_first(monkeypatch, clock):
     monkeypatch.setattr(sys, "stderr", Terminal())
     _progress.watch_command("static-optimization")
     clock.now = 2.0
-    _progress._line.draw()
+    _progress.progress_line.draw()
     assert shown(sys.stderr) == "computing muscle forces: 2 s"
     out = _console.EscapingStream(io.StringIO())
     out.write("done\n")
     assert shown(sys.stderr) == ""
     # The line reappears only after another half second.
     clock.now = 2.3
-    _progress._line.draw()
+    _progress.progress_line.draw()
     assert shown(sys.stderr) == ""
     report_progress("tracking", 1.0, 2.0, " s")
     clock.now = 3.0
-    _progress._line.draw()
+    _progress.progress_line.draw()
     assert shown(sys.stderr) == "tracking: 50 % (1 of 2 s)"
     _progress.finish_command()
     assert shown(sys.stderr) == ""
@@ -131,7 +131,7 @@ def test_parts_of_a_task_have_their_own_progress(monkeypatch, clock):
         progress(1.0)
         report_stage("writing results")
         clock.now = 3.0
-        _progress._line.draw()
+        _progress.progress_line.draw()
         assert shown(sys.stderr) == "running, 1 of 3 done; writing results: 3 s"
         report_progress("computing moments", 10.0, 40.0, " frames")
         clock.now = 6.0
@@ -151,7 +151,7 @@ def test_a_stage_continues_after_its_parts(monkeypatch, clock):
         report_progress("computing moments", 20.0, 40.0, " frames")
         report_progress("computing moments", 40.0, 40.0, " frames")
         clock.now = 3.0
-        _progress._line.draw()
+        _progress.progress_line.draw()
         assert shown(sys.stderr) == "InverseDynamicsTool: computing: 3 s"
 
 
@@ -160,22 +160,22 @@ def test_the_line_comes_back_at_once_after_another_task(monkeypatch, clock):
     _progress.watch_command("simulate")
     clock.now = 2.0
     with progress_bar("drawing", None):
-        _progress._line.draw()
+        _progress.progress_line.draw()
     clock.now = 2.2
-    _progress._line.draw()
+    _progress.progress_line.draw()
     assert shown(sys.stderr) == "simulating: 2 s"
 
 
 def test_steps_of_the_tour_have_their_own_line(monkeypatch, clock, tmp_path):
-    from osimlite.cli.demo import _Tour
+    from osimlite.cli.demo import Tour
 
     monkeypatch.setattr(sys, "stderr", Terminal())
     _progress.watch_command("demo")
-    tour = _Tour(tmp_path)
+    tour = Tour(tmp_path)
     for _ in range(2):
         with tour.step("Translate it") as report_result:
             clock.now += 3.0
-            _progress._line.draw()
+            _progress.progress_line.draw()
             assert shown(sys.stderr) == f"   step {tour.steps}: 3 s"
             report_result("done")
     _progress.finish_command()
@@ -184,7 +184,7 @@ def test_steps_of_the_tour_have_their_own_line(monkeypatch, clock, tmp_path):
 def test_commands_that_wait_for_people_have_no_line(monkeypatch, clock):
     monkeypatch.setattr(sys, "stderr", Terminal())
     _progress.watch_command("lsp")
-    assert not _progress._line.tasks
+    assert not _progress.progress_line.tasks
 
 
 def test_a_log_has_two_lines_of_long_work_and_none_of_short(monkeypatch, clock):
@@ -213,5 +213,5 @@ def test_people_see_what_the_engine_warns_of(monkeypatch, clock):
     _progress.watch_command("run")
     log.info("compiling 3 kernels")
     clock.now = 0.7
-    _progress._line.draw()
+    _progress.progress_line.draw()
     assert shown(sys.stderr) == "running: compiling 3 kernels (once per machine)"

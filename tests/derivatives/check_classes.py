@@ -44,9 +44,9 @@ from osimlite.simulation.elements.registry import FORCE_TYPES
 from osimlite.simulation.pack import pack
 from osimlite.simulation.run import Simulation
 from osimlite.simulation.states import StateLayout
-from tests.derivatives.jets import carried
+from tests.derivatives.jets import differentiate_by_jets
 from tests.derivatives.machine import Beside, off, slope
-from tests.mechanics.multibody.strategies import JOINT_TYPES, KINDS, _body, constraint_of
+from tests.mechanics.multibody.strategies import JOINT_TYPES, KINDS, constraint_of, make_random_body
 from tests.simulation.elements.muscle_rows import CONFIGURATIONS, hung, muscle
 from tests.simulation.force_cases import FORCES, straight, with_force
 
@@ -206,7 +206,7 @@ def test_trees_of_joints(held, seed):
             if index
             else JOINT_TYPES[seed % len(JOINT_TYPES)]
         )
-        body, own = _body(
+        body, own = make_random_body(
             index, int(rng.integers(-1, index)), kind, bool(rng.integers(2)), len(infos), rng
         )
         bodies.append(body)
@@ -230,7 +230,7 @@ def test_trees_of_joints(held, seed):
     count = int(packed.structure[at + CONSTRAINED.EQUATIONS]) if at else 0
     y = layout.pack(q.tolist(), u.tolist())
     way = rng.normal(size=len(y))
-    value, jacobian, bends = carried(packed, 0.3, y, [], way)
+    value, jacobian, bends = differentiate_by_jets(packed, 0.3, y, [], way)
     x, d = casadi.SX.sym("x", len(y)), casadi.SX.sym("d", len(y))
     traced = SymbolicEvaluator(
         packed, forces, packed.numbers.tolist(), 0.3, casadi.vertsplit(x), (), equations

@@ -207,7 +207,7 @@ OURS = "osimlite.mechanics.laws", "osimlite.mechanics.kernels", "osimlite.simula
 
 
 @contextmanager
-def _carried(functions: list[Any]) -> Iterator[None]:
+def use_jets(functions: list[Any]) -> Iterator[None]:
     """Replace the mathematics of functions, and of all functions that they call, by that of jets."""
     done: dict[int, Any] = {}
     changed: list[tuple[dict[str, Any], str, Any]] = []
@@ -239,7 +239,7 @@ def _carried(functions: list[Any]) -> Iterator[None]:
                 scope[name] = value
 
 
-def carried(
+def differentiate_by_jets(
     packed: Any, t: float, y: list[float], controls: list[float], along: Any
 ) -> tuple[Any, Any, Any]:
     """Compute the state derivative with its first and second derivatives.
@@ -268,7 +268,7 @@ def carried(
     )[:-1]
     f = np.zeros(len(y)).astype(object)
     kernels = [*packed.laws, *(k for k in packed.kernels.values() if isinstance(k, str))]
-    with _carried([evaluate, *map(find_function, kernels)]):
+    with use_jets([evaluate, *map(find_function, kernels)]):
         evaluate(s, packed.numbers.astype(object), w, state, f, STAGE.ACCELERATION)
     found = [each if isinstance(each, Jet) else Jet(float(each), none, 0.0, none) for each in f]
     value, slopes, bends = (np.array([getattr(e, part) for e in found]) for part in ("v", "g", "h"))

@@ -12,7 +12,7 @@ import osimlite
 from osimlite.simulation.constrained import find_consistent_state
 from osimlite.simulation.pack import pack
 from osimlite.simulation.run import Simulation
-from tests.derivatives.jets import carried
+from tests.derivatives.jets import differentiate_by_jets
 
 
 class Beside:
@@ -99,7 +99,7 @@ class Beside:
         y, way = np.zeros(n), np.zeros(n)
         y[self.places], way[self.places] = x, along
         packed = pack(self.engine.mechanism, self.engine.forces)
-        value, jacobian, bends = carried(packed, self.t, y.tolist(), u.tolist(), way)
+        value, jacobian, bends = differentiate_by_jets(packed, self.t, y.tolist(), u.tolist(), way)
         value, bends = value[self.places], bends[np.ix_(self.places, self.places)]
         jacobian = jacobian[np.ix_(self.places, self.places)]
         found = self._derivatives(x, u, push, along)

@@ -48,7 +48,7 @@ from osimlite.simulation.engines.compiled_laws import compile_function
 from osimlite.simulation.engines.machine_code import prepare_laws
 from osimlite.simulation.pack import pack
 from tests.conftest import ROOT, SHARED
-from tests.derivatives.jets import Jet, _carried, carried
+from tests.derivatives.jets import Jet, differentiate_by_jets, use_jets
 from tests.derivatives.machine import off, slope
 
 WAYS = 3
@@ -153,7 +153,7 @@ def test_every_rule_is_that_of_python(a, b, along):
         for rows in (x, y)
     ]
     wanted = np.zeros(40, dtype=object)
-    with _carried([rules]):
+    with use_jets([rules]):
         assert rules(np.zeros(1), jets[0], wanted, jets[1], wanted, 0) == steps
     for row, jet in zip(found, wanted, strict=True):
         value, change = (jet.v, jet.g) if isinstance(jet, Jet) else (float(jet), none)
@@ -211,7 +211,7 @@ def test_whole_models(name):
     rates, a, b = made.linear(0.3, x, u)
     y = np.zeros(size)
     y[made.state_indices] = x
-    value, wanted, _ = carried(
+    value, wanted, _ = differentiate_by_jets(
         pack(made.mechanism, made.forces), 0.3, y.tolist(), u.tolist(), np.zeros(size)
     )
     places = np.ix_(made.state_indices, made.state_indices)

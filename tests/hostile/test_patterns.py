@@ -198,9 +198,9 @@ def test_setups_that_name_each_other_are_read_once(
         (tmp_path / f"s{number}.xml").write_text(CHAIN.format(following))
     found = {*find_named_files(str(tmp_path / "s0.xml"), "file")}
     assert {str(tmp_path / f"s{number}.xml") for number in range(1, count)} <= found
-    from osimlite.tools.running import _check_documents
+    from osimlite.tools.running import check_documents
 
-    assert len([*_check_documents(str(tmp_path / "s0.xml"), {})]) == count
+    assert len([*check_documents(str(tmp_path / "s0.xml"), {})]) == count
     monkeypatch.setattr("osimlite.tools.named_files.MAX_DOCUMENTS", 5)
     with pytest.raises(OsimliteError, match="more than 5 documents"):
         [*find_named_files(str(tmp_path / "s0.xml"), "file")]

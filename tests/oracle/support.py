@@ -47,11 +47,12 @@ Bodies = list[Any]
 Change = Callable[[Any, Bodies], None]
 
 
-def _vec(*values: float) -> Any:
+def make_vec3(*values: float) -> Any:
+    """Return OpenSim's vector of three numbers."""
     return opensim.Vec3(*values)
 
 
-def _chain(rng: np.random.Generator) -> tuple[Any, Bodies]:
+def make_constrained_chain(rng: np.random.Generator) -> tuple[Any, Bodies]:
     """Return a model with a body on a ball joint, one on a pin beyond it, and one that floats freely.
 
     Returns:
@@ -60,13 +61,13 @@ def _chain(rng: np.random.Generator) -> tuple[Any, Bodies]:
     opensim.Logger.setLevelString("off")
     model = opensim.Model()
     model.setName("m")
-    model.setGravity(_vec(0.3, -9.5, 0.7))
+    model.setGravity(make_vec3(0.3, -9.5, 0.7))
     bodies = []
     for name in ("inner", "outer", "loose"):
         body = opensim.Body()
         body.setName(name)
         body.set_mass(rng.uniform(0.5, 2.0))
-        body.set_mass_center(_vec(*rng.uniform(-0.2, 0.2, 3)))
+        body.set_mass_center(make_vec3(*rng.uniform(-0.2, 0.2, 3)))
         body.set_inertia(opensim.Vec6(*rng.uniform(0.2, 0.3, 3), *rng.uniform(-0.03, 0.03, 3)))
         model.addBody(body)
         bodies.append(body)
@@ -76,7 +77,7 @@ def _chain(rng: np.random.Generator) -> tuple[Any, Bodies]:
         ("PinJoint", "pin", inner, outer, 1),
         ("FreeJoint", "free", model.getGround(), loose, 6),
     ):
-        spots = [_vec(*rng.uniform(-size, size, 3)) for size in (0.3, 1.0, 0.3, 1.0)]
+        spots = [make_vec3(*rng.uniform(-size, size, 3)) for size in (0.3, 1.0, 0.3, 1.0)]
         joint = getattr(opensim, kind)(name, parent, spots[0], spots[1], child, spots[2], spots[3])
         for index in range(count):
             coordinate = joint.upd_coordinates(index)
@@ -88,20 +89,26 @@ def _chain(rng: np.random.Generator) -> tuple[Any, Bodies]:
 
 def _point(model: Any, bodies: Bodies) -> None:
     model.addConstraint(
-        opensim.PointConstraint(bodies[1], _vec(0.1, 0.2, 0.3), bodies[2], _vec(0.2, -0.1, 0.1))
+        opensim.PointConstraint(
+            bodies[1], make_vec3(0.1, 0.2, 0.3), bodies[2], make_vec3(0.2, -0.1, 0.1)
+        )
     )
 
 
 def _rod(model: Any, bodies: Bodies) -> None:
     constraint = opensim.ConstantDistanceConstraint(
-        bodies[1], _vec(0.1, 0.2, 0.3), bodies[2], _vec(0.2, -0.1, 0.1), 0.8
+        bodies[1], make_vec3(0.1, 0.2, 0.3), bodies[2], make_vec3(0.2, -0.1, 0.1), 0.8
     )
     model.addConstraint(constraint)
 
 
 def _line(model: Any, bodies: Bodies) -> None:
     constraint = opensim.PointOnLineConstraint(
-        bodies[1], _vec(0.3, 1.0, -0.2), _vec(0.1, 0.0, 0.2), bodies[2], _vec(0.2, -0.1, 0.1)
+        bodies[1],
+        make_vec3(0.3, 1.0, -0.2),
+        make_vec3(0.1, 0.0, 0.2),
+        bodies[2],
+        make_vec3(0.2, -0.1, 0.1),
     )
     model.addConstraint(constraint)
 
@@ -110,11 +117,11 @@ def _weld(model: Any, bodies: Bodies) -> None:
     constraint = opensim.WeldConstraint(
         "weld",
         bodies[1],
-        _vec(0.1, 0.2, 0.3),
-        _vec(0.3, 0.2, 0.1),
+        make_vec3(0.1, 0.2, 0.3),
+        make_vec3(0.3, 0.2, 0.1),
         bodies[2],
-        _vec(0.0, 0.1, 0.0),
-        _vec(0.1, 0.3, 0.2),
+        make_vec3(0.0, 0.1, 0.0),
+        make_vec3(0.1, 0.3, 0.2),
     )
     model.addConstraint(constraint)
 
@@ -127,19 +134,23 @@ def _point_on_offset_frame(model: Any, bodies: Bodies) -> None:
     frame = opensim.PhysicalOffsetFrame(
         "spot",
         bodies[1],
-        opensim.Transform(opensim.Rotation(0.5, opensim.CoordinateAxis(1)), _vec(0.3, 0.0, 0.1)),
+        opensim.Transform(
+            opensim.Rotation(0.5, opensim.CoordinateAxis(1)), make_vec3(0.3, 0.0, 0.1)
+        ),
     )
     bodies[1].addComponent(frame)
     constraint = opensim.PointConstraint(
-        bodies[0], _vec(0.1, 0.2, 0.3), bodies[2], _vec(0.2, -0.1, 0.1)
+        bodies[0], make_vec3(0.1, 0.2, 0.3), bodies[2], make_vec3(0.2, -0.1, 0.1)
     )
     constraint.updSocket("body_1").connect(frame)
     model.addConstraint(constraint)
 
 
-def _coupler(
+def make_coupler(
     names: tuple[str, ...], dependent: str, function: Any, scale: float = 1.0
 ) -> Callable[[Any, Bodies], None]:
+    """Return a function that adds a coordinate coupler to a model of OpenSim."""
+
     def add(model: Any, bodies: Bodies) -> None:
         constraint = opensim.CoordinateCouplerConstraint()
         independent = opensim.ArrayStr()
@@ -165,7 +176,8 @@ def _polynomial() -> Any:
     return opensim.PolynomialFunction(opensim.Vector.createFromMat(np.array((0.3, -0.5, 0.2, 0.1))))
 
 
-def _linear(coefficients: tuple[float, ...]) -> Any:
+def make_linear_function(coefficients: tuple[float, ...]) -> Any:
+    """Return OpenSim's linear function, whose last coefficient is the constant."""
     array = opensim.ArrayDouble()
     for value in coefficients:
         array.append(value)
@@ -177,7 +189,7 @@ def _linear(coefficients: tuple[float, ...]) -> Any:
 def _prescribed(model: Any, bodies: Bodies) -> None:
     for joint, place, function in (
         ("pin", 0, opensim.Sine(0.4, 3.0, 0.2, 0.1)),
-        ("ball", 1, _linear((0.5, 0.2))),
+        ("ball", 1, make_linear_function((0.5, 0.2))),
     ):
         coordinate = model.updJointSet().get(joint).upd_coordinates(place)
         coordinate.setPrescribedFunction(function)
@@ -189,16 +201,18 @@ def _prescribed_with_rod(model: Any, bodies: Bodies) -> None:
     _rod(model, bodies)
 
 
-# Constraints and prescribed coordinates by name, as functions that add them to the model of `_chain`.
+# Constraints and prescribed coordinates by name, as functions that add them to the model of `make_constrained_chain`.
 CASES: dict[str, Change] = {
     "point": _point,
     "rod": _rod,
     "line": _line,
     "weld": _weld,
     "point-on-offset-frame": _point_on_offset_frame,
-    "coupler-spline": _coupler(("pin_0",), "free_3", _spline()),
-    "coupler-of-ball-angles": _coupler(("ball_1",), "ball_0", _polynomial(), 0.6),
-    "coupler-of-two": _coupler(("ball_0", "pin_0"), "free_1", _linear((0.4, -0.7, 0.1))),
+    "coupler-spline": make_coupler(("pin_0",), "free_3", _spline()),
+    "coupler-of-ball-angles": make_coupler(("ball_1",), "ball_0", _polynomial(), 0.6),
+    "coupler-of-two": make_coupler(
+        ("ball_0", "pin_0"), "free_1", make_linear_function((0.4, -0.7, 0.1))
+    ),
     "prescribed": _prescribed,
     "prescribed-with-rod": _prescribed_with_rod,
 }

@@ -20,7 +20,7 @@ import osimlite
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.models.jumper import jumper
 from osimlite.translate.biomod import to_biomod
-from tests.translate.test_biomod import make_tilted
+from tests.translate.support import make_tilted
 
 pytestmark = pytest.mark.full
 

@@ -16,7 +16,7 @@ from osimlite.schema.muscles import Muscle
 from osimlite.schema.path_forces import PathSpring
 from osimlite.simulation import Simulation
 from osimlite.simulation.elements.registry import FORCE_TYPES
-from tests.oracle.support import CASES, _chain
+from tests.oracle.support import CASES, make_constrained_chain
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle
@@ -77,7 +77,7 @@ def both(
 
 @pytest.mark.parametrize("case", CASES)
 def test_motion_under_constraints(case: str, engine: str, tmp_path: Path) -> None:
-    model, bodies = _chain(np.random.default_rng(21))
+    model, bodies = make_constrained_chain(np.random.default_rng(21))
     CASES[case](model, bodies)
     model.finalizeConnections()
     model.printToXML(str(tmp_path / "model.osim"))

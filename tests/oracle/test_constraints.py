@@ -18,11 +18,11 @@ from tests.oracle.support import (
     CASES,
     Bodies,
     Change,
-    _chain,
-    _coupler,
-    _linear,
-    _vec,
     build_printed,
+    make_constrained_chain,
+    make_coupler,
+    make_linear_function,
+    make_vec3,
     opensim,
 )
 
@@ -45,7 +45,12 @@ def _rolling(model: Any, bodies: Bodies) -> None:
     model.addConstraint(constraint.clone())
 
 
-LOOP = (_vec(0.1, 0.0, 0.2), _vec(0.3, 0.2, 0.1), _vec(0.0, 0.1, 0.0), _vec(0.1, 0.3, 0.2))
+LOOP = (
+    make_vec3(0.1, 0.0, 0.2),
+    make_vec3(0.3, 0.2, 0.1),
+    make_vec3(0.0, 0.1, 0.0),
+    make_vec3(0.1, 0.3, 0.2),
+)
 
 
 def _weld_like_loop(model: Any, bodies: Bodies) -> None:
@@ -59,11 +64,11 @@ def _loop(kind: str, count: int) -> Change:
         joint = getattr(opensim, kind)(
             "loop",
             bodies[2],
-            _vec(0.1, 0.0, 0.2),
-            _vec(0.3, 0.2, 0.1),
+            make_vec3(0.1, 0.0, 0.2),
+            make_vec3(0.3, 0.2, 0.1),
             bodies[1],
-            _vec(0.0, 0.1, 0.0),
-            _vec(0.1, 0.3, 0.2),
+            make_vec3(0.0, 0.1, 0.0),
+            make_vec3(0.1, 0.3, 0.2),
         )
         for index in range(count):
             joint.upd_coordinates(index).setName(f"loop_{index}")
@@ -77,8 +82,8 @@ def test_a_coupler_by_a_constant_binds_the_dependent_coordinate(tmp_path: Path) 
 
     OpenSim constrains the first independent coordinate instead, and leaves the dependent one free.
     """
-    model, bodies = _chain(np.random.default_rng(15))
-    _coupler(("pin_0",), "free_3", opensim.Constant(0.25))(model, bodies)
+    model, bodies = make_constrained_chain(np.random.default_rng(15))
+    make_coupler(("pin_0",), "free_3", opensim.Constant(0.25))(model, bodies)
     mechanism = build_printed(model, tmp_path)
     model, state, coordinates = _loaded(tmp_path, mechanism)
     pin, free = (mechanism.coordinate_index(name) for name in ("pin_0", "free_3"))
@@ -155,7 +160,7 @@ def _unbroken(model: Any, state: Any) -> None:
 @pytest.mark.parametrize("case", CASES)
 def test_constrained_motion(case: str, tmp_path: Path) -> None:
     rng = np.random.default_rng(11)
-    model, bodies = _chain(rng)
+    model, bodies = make_constrained_chain(rng)
     CASES[case](model, bodies)
     mechanism = build_printed(model, tmp_path)
     model, state, coordinates = _loaded(tmp_path, mechanism)
@@ -173,7 +178,7 @@ def test_constrained_motion(case: str, tmp_path: Path) -> None:
 )
 def test_a_loop_splits_a_body(kind: str, count: int, tmp_path: Path) -> None:
     rng = np.random.default_rng(12)
-    model, bodies = _chain(rng)
+    model, bodies = make_constrained_chain(rng)
     _loop(kind, count)(model, bodies)
     mechanism = build_printed(model, tmp_path)
     model, state, coordinates = _loaded(tmp_path, mechanism)
@@ -197,7 +202,7 @@ def test_a_loop_splits_a_body(kind: str, count: int, tmp_path: Path) -> None:
 def test_a_weld_that_closes_a_loop_is_a_constraint(tmp_path: Path) -> None:
     built = []
     for change in (_loop("WeldJoint", 0), _weld_like_loop):
-        model, bodies = _chain(np.random.default_rng(13))
+        model, bodies = make_constrained_chain(np.random.default_rng(13))
         change(model, bodies)
         built.append(build_printed(model, tmp_path))
     by_joint, by_constraint = built
@@ -210,7 +215,7 @@ def test_a_weld_that_closes_a_loop_is_a_constraint(tmp_path: Path) -> None:
 def test_rolling_acts_when_asked_for(tmp_path: Path) -> None:
     """OpenSim does not enforce rolling by default, and finds no violation in our states once enforced."""
     rng = np.random.default_rng(14)
-    model, bodies = _chain(rng)
+    model, bodies = make_constrained_chain(rng)
     _rolling(model, bodies)
     plain = build_printed(model, tmp_path)
     mechanism = build_mechanism(osimlite.read(tmp_path / "model.osim"), rolling=True)
@@ -231,8 +236,8 @@ def test_a_motion_starts_at_opensims_pose(accuracy: float, off: float, tmp_path:
 
     Only its integrator then projects the pose onto the constraints, by the shortest way.
     """
-    model, bodies = _chain(np.random.default_rng(14))
-    _coupler(("ball_0",), "pin_0", _linear((1.0, 0.0)))(model, bodies)
+    model, bodies = make_constrained_chain(np.random.default_rng(14))
+    make_coupler(("ball_0",), "pin_0", make_linear_function((1.0, 0.0)))(model, bodies)
     model.set_assembly_accuracy(accuracy)
     model.updJointSet().get("pin").upd_coordinates(0).set_default_value(0.2 + off)
     mechanism = build_printed(model, tmp_path)

@@ -13,7 +13,7 @@ import pytest
 import osimlite
 from osimlite.io.tables.storage import read_sto
 from tests.labs import change, copy_lab
-from tests.oracle.test_time_ranges import TOOLS, Tool, lay_out_loop, lay_out_scaling
+from tests.oracle.ranged_tools import TOOLS, Tool, lay_out_loop, lay_out_scaling
 
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle

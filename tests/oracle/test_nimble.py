@@ -22,7 +22,7 @@ from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.translate.nimble import convert_from_nimble
 from tests.io import b3d_files as files
 from tests.nimble import ask_nimble, find_nimble_poses
-from tests.translate.test_nimble import CUSTOM, make_custom, make_ellipsoid
+from tests.translate.nimble_models import CUSTOM, make_custom, make_ellipsoid
 
 pytestmark = [pytest.mark.full, pytest.mark.oracle]
 

@@ -29,7 +29,7 @@ def _inside(place: Any) -> Any:
     return place
 
 
-class Checked(linking._PythonCode):
+class Checked(linking.PythonCode):
     """Kernels as Python on bounded vectors."""
 
     def get_entry(self, function: str) -> Any:

@@ -228,7 +228,7 @@ def test_the_check_reads_each_document_once(
         monkeypatch.setattr(
             module, "read_document", partial(read_counted, files, module.read_document)
         )
-    reports = list(running._check_documents(str(setup), {}))
+    reports = list(running.check_documents(str(setup), {}))
     assert len(reports) == 3
     assert sorted(files) == ["loads.xml", "setup.xml", "walker.osim"]
     # Each reader of a cached document gets a copy, which it may change.

@@ -17,32 +17,7 @@ from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.models.jumper import jumper
 from osimlite.translate.biomod import BioMod, to_biomod
 from tests.cli.command import run
-from tests.io.b3d_files import make_walker
-
-
-def make_tilted() -> osimlite.Model:
-    """Return a walker with a hip about an oblique axis, a marker and a muscle."""
-    model = make_walker()
-    function = osimlite.LinearFunction(coefficients=(1.0, 0.0))
-    axis = osimlite.TransformAxis(
-        name="rotation1", axis=(0.6, 0.0, -0.8), function=function, coordinates=("swing",)
-    )
-    tail = model.add(osimlite.Body(name="tail", mass=1.0, inertia=(1.0, 2.0, 2.5, 0.1, 0.0, 0.0)))
-    joint = osimlite.CustomJoint(
-        name="tail",
-        coordinates=[osimlite.Coordinate(name="swing")],
-        spatial_transform=osimlite.SpatialTransform(rotation1=axis),
-    )
-    model.add(joint.between(model["/bodyset/pelvis"], tail, at=(-0.1, 0.0, 0.0)))
-    model.add(osimlite.Marker(name="tip", socket_parent_frame=tail, location=(0.1, 0.2, 0.3)))
-    muscle = osimlite.Thelen2003Muscle(
-        name="wagger", max_isometric_force=200.0, max_contraction_velocity=7.5
-    )
-    muscle.geometry_path.add_point(model["/bodyset/pelvis"], (0.0, 0.1, 0.0))
-    muscle.geometry_path.add_point(model["/bodyset/pelvis"], (-0.05, 0.1, 0.0))
-    muscle.geometry_path.add_point(tail, (-0.2, 0.0, 0.05))
-    model.add(muscle)
-    return model
+from tests.translate.support import make_tilted
 
 
 def find_segments(made: BioMod, values: dict[str, float]) -> dict[str, np.ndarray]:

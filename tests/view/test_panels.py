@@ -343,12 +343,12 @@ def test_results_draw_themselves(tmp_path):
 
 
 def test_rounding_errors_of_a_constant_moment_arm_do_not_show():
-    from osimlite.view.muscle_plots import _widen_constant
+    from osimlite.view.muscle_plots import widen_constant_range
     from osimlite.view.panels import make_figure
 
     place = make_figure("", (4.0, 3.0)).subplots()
     place.plot(TIMES, 0.042 + 1e-17 * wave())
-    _widen_constant(place)
+    widen_constant_range(place)
     low, high = place.get_ylim()
     assert high - low > 0.008
 

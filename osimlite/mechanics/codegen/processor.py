@@ -33,7 +33,7 @@ def processor_features() -> frozenset[str]:
     """
     system: str = sys.platform
     if system == "linux":
-        return _read_cpuinfo("/proc/cpuinfo")
+        return read_cpuinfo("/proc/cpuinfo")
     if system == "darwin" and machine_name() == "x86_64":
         return X86_64_V3 if _query_sysctl(b"hw.optional.avx2_0") else frozenset()
     if system == "win32" and machine_name() == "x86_64":
@@ -47,7 +47,7 @@ def supports_v3() -> bool:
     return machine_name() == "x86_64" and processor_features() >= X86_64_V3
 
 
-def _read_cpuinfo(path: str) -> frozenset[str]:
+def read_cpuinfo(path: str) -> frozenset[str]:
     """Return the features of the first processor that Linux lists."""
     try:
         with open(path, encoding="ascii", errors="replace") as stream:

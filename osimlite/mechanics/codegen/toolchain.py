@@ -178,7 +178,7 @@ def find_compiler() -> Compiler | None:
     command = os.environ.get("CXX")
     if command:
         return _examine_compiler(tuple(shlex.split(command, posix=os.name != "nt")))
-    if sys.platform == "darwin" and not _has_developer_tools():
+    if sys.platform == "darwin" and not has_developer_tools():
         return None
     for program in PROGRAMS:
         path = shutil.which(program)
@@ -226,7 +226,7 @@ def _examine_compiler(command: tuple[str, ...]) -> Compiler | None:
     return Compiler(command, words[0].strip(), not is_clang)
 
 
-def _has_developer_tools() -> bool:
+def has_developer_tools() -> bool:
     """Return whether macOS has its developer tools.
 
     Without them, `clang++` is a program that asks to install them.

@@ -183,7 +183,7 @@ def _load_library(path: Path, symbol: str) -> int:
 
 def _file_name(symbol: str, function: Function, directions: int) -> str:
     """Return the file name of a function, which depends on its sources and on the processor."""
-    parts = compute_digest(function, _digest_translator()), directions, _describe_machine()
+    parts = compute_digest(function, _digest_translator()), directions, describe_machine()
     return f"{symbol}-{hashlib.sha256(repr(parts).encode()).hexdigest()[:16]}{library_suffix()}"
 
 
@@ -197,6 +197,6 @@ def _digest_translator() -> str:
 
 
 @cache
-def _describe_machine() -> tuple[str, ...]:
+def describe_machine() -> tuple[str, ...]:
     """Return the operating system, the architecture and the features of the processor."""
     return sys.platform, machine_name(), *sorted(processor_features())

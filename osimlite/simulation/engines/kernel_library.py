@@ -142,16 +142,16 @@ def load_library() -> KernelLibrary | None:
             try:
                 library = KernelLibrary(path)
             except (OSError, ValueError) as error:
-                _problems.append(f"{path.name} cannot be loaded: {error}")
+                loading_problems.append(f"{path.name} cannot be loaded: {error}")
                 continue
             # A native library of another machine may use instructions that this processor lacks.
             if set(library.table.get("features", ())) <= processor_features():
                 return library
-            _problems.append(f"{path.name} was compiled for another processor")
+            loading_problems.append(f"{path.name} was compiled for another processor")
     return None
 
 
-_problems: list[str] = []
+loading_problems: list[str] = []
 """Reasons why existing libraries are not used."""
 
 
@@ -159,6 +159,6 @@ def explain_absence() -> str:
     """Return the reason why there is no library; empty if there is one."""
     if load_library() is not None:
         return ""
-    if _problems:
-        return "; ".join(_problems)
+    if loading_problems:
+        return "; ".join(loading_problems)
     return "osimlite was installed without a library of kernels"

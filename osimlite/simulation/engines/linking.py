@@ -198,31 +198,35 @@ class ReadyCode(_MachineCode):
         return MACHINE_CODE if all(map(machine_code.is_ready, functions)) else PYTHON_CODE
 
 
-class _PythonCode(Code):
+class PythonCode(Code):
     """Backend that interprets the kernels; see :class:`Code`."""
 
     def make_ready(self, functions: Sequence[str]) -> None:
-        pass
+        """Do nothing, since Python needs no compilation."""
 
     def get_address(self, function: str) -> int:
+        """Return the number under which a law, or its response, is registered."""
         law = find_function(function)
         return pointers.register_law(make_dual(law) if function.endswith(RESPONSE) else law)
 
     def get_entry(self, function: str) -> Callable[..., int]:
+        """Return a kernel that takes arrays of any shape."""
         kernel = find_function(function)
         return lambda *parts: kernel(
             *(part.reshape(-1) if isinstance(part, np.ndarray) else part for part in parts)
         )
 
     def bind_entry(self, function: str, *arrays: Any) -> Callable[[int], int]:
+        """Return a kernel with all arguments but its last."""
         kernel = find_function(function)
         return lambda number: kernel(*arrays, number)
 
     def make_callback(self, python: Callable[..., int], sizes: Sequence[int]) -> tuple[int, Any]:
+        """Return the number under which a function is registered, and nothing to keep alive."""
         return pointers.register_law(python), None
 
 
-class PythonTangents(_PythonCode):
+class PythonTangents(PythonCode):
     """Kernels as Python with dual numbers; the arrays are those of :class:`Tangents`.
 
     Args:
@@ -280,7 +284,7 @@ def _to_duals(part: Any) -> Any:
 MACHINE_CODE = _MachineCode("machine code")
 """Backend that compiles kernels or loads compiled ones."""
 
-PYTHON_CODE = _PythonCode("Python")
+PYTHON_CODE = PythonCode("Python")
 """Backend that interprets the kernels as Python."""
 
 READY_CODE = ReadyCode("machine code that is in files, or Python")

@@ -32,7 +32,7 @@ PYTHON = "python"
 SOURCES = LIBRARY, COMPILER, NUMBA, PYTHON
 """All sources in the order in which they are tried."""
 
-_addresses: dict[str, int] = {}
+law_addresses: dict[str, int] = {}
 """Addresses of the laws that are ready, by name."""
 
 
@@ -58,7 +58,7 @@ def get_address(name: str) -> int:
         CompilationError: the law cannot be compiled here.
     """
     prepare_laws([name])
-    return _addresses[name]
+    return law_addresses[name]
 
 
 def use_addresses(addresses: Mapping[str, int]) -> None:
@@ -67,7 +67,7 @@ def use_addresses(addresses: Mapping[str, int]) -> None:
     Args:
         addresses: address of each law's function by name of the law.
     """
-    _addresses.update(addresses)
+    law_addresses.update(addresses)
 
 
 def is_ready(name: str) -> bool:
@@ -76,7 +76,7 @@ def is_ready(name: str) -> bool:
     Args:
         name: name of the kernel. It may be loaded already, in the library, or in a file.
     """
-    if name in _addresses:
+    if name in law_addresses:
         return True
     address = None
     # The sources are tried in the order of their speed.
@@ -87,7 +87,7 @@ def is_ready(name: str) -> bool:
 
         address = compiled_laws.load_law(name)
     if address is not None:
-        _addresses[name] = address
+        law_addresses[name] = address
     return address is not None
 
 
@@ -108,7 +108,7 @@ def prepare_laws(names: Sequence[str]) -> None:
         from osimlite.simulation.engines import compiled_laws
 
         try:
-            _addresses.update(compiled_laws.compile_laws(missing))
+            law_addresses.update(compiled_laws.compile_laws(missing))
             return
         except CompilationError as error:
             # The compiler may lack what a law needs; numba may still work.
@@ -118,7 +118,7 @@ def prepare_laws(names: Sequence[str]) -> None:
         from osimlite.simulation.engines import numba_laws
 
         for name in missing:
-            _addresses[name] = numba_laws.compile_law(name)
+            law_addresses[name] = numba_laws.compile_law(name)
         return
     message = f"'{missing[0]}' is in no library, and there is neither a C++ compiler nor numba to compile it"
     # The error of the compiler says more than a general one.

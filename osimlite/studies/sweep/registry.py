@@ -45,7 +45,7 @@ class RegisteredMeasure(NamedTuple):
     is_maximized: bool
 
 
-_MEASURES: dict[str, RegisteredMeasure] = {}
+MEASURES: dict[str, RegisteredMeasure] = {}
 """Measures by name."""
 _STARTS: dict[str, Callable[[Any, Sequence[str] | None], StartFunction]] = {}
 """Initial states by name."""
@@ -55,7 +55,7 @@ def register_measure(*, is_maximized: bool = False) -> Callable[[F], F]:
     """Return a decorator that registers a function which makes a measure, under its name."""
 
     def register(make: F) -> F:
-        _MEASURES[make.__name__] = RegisteredMeasure(make, is_maximized)
+        MEASURES[make.__name__] = RegisteredMeasure(make, is_maximized)
         return make
 
     return register
@@ -74,7 +74,7 @@ def register_start(make: F) -> F:
 def find_measure(name: str) -> RegisteredMeasure | None:
     """Return the measure of a name, or None."""
     # An expression or a path cannot be a registered name, and need not load any provider.
-    return _load_provider(_MEASURES, name) if name.isidentifier() else None
+    return _load_provider(MEASURES, name) if name.isidentifier() else None
 
 
 def make_gradients(plan: Plan) -> Any:
@@ -95,8 +95,8 @@ def find_start(name: str) -> Callable[[Any, Sequence[str] | None], StartFunction
 def list_measure_names() -> list[str]:
     """Return the names of all measures."""
     # An unknown name makes all providers load.
-    _load_provider(_MEASURES, "")
-    return list(_MEASURES)
+    _load_provider(MEASURES, "")
+    return list(MEASURES)
 
 
 def _load_provider(table: dict[str, T], name: str) -> T | None:

@@ -95,7 +95,7 @@ def coordinates_of(motions: tuple[JointMotion, ...]) -> int:
     return 1 + max((place for motion in motions for place in motion.coordinates), default=-1)
 
 
-def _body(
+def make_random_body(
     index: int,
     parent: int,
     joint_type: str,
@@ -138,7 +138,9 @@ def cases(draw: st.DrawFn, *, max_bodies: int = 5) -> Case:
     for index in range(count):
         joint_type = draw(st.sampled_from(JOINT_TYPES))
         parent, turned_round = draw(st.integers(-1, index - 1)), draw(st.booleans())
-        body, infos = _body(index, parent, joint_type, turned_round, len(coordinates), rng)
+        body, infos = make_random_body(
+            index, parent, joint_type, turned_round, len(coordinates), rng
+        )
         bodies.append(body)
         coordinates += infos
     mechanism = Mechanism("random", tuple(bodies), tuple(coordinates), np.array((0.3, -9.5, 0.7)))

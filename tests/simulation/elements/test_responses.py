@@ -18,7 +18,7 @@ from osimlite.simulation.elements.force_type import DeclaredForce
 from osimlite.simulation.elements.laws import RESPONSE
 from osimlite.simulation.engines.linking import MACHINE_CODE
 from osimlite.simulation.system import System
-from tests.derivatives.jets import Jet, _carried
+from tests.derivatives.jets import Jet, use_jets
 from tests.simulation.checked import Checked
 from tests.simulation.elements.muscle_rows import CONFIGURATIONS, hung, muscle
 from tests.simulation.force_cases import FORCE_NAMES, FORCES, with_force
@@ -95,9 +95,9 @@ def test_they_are_derivatives_of_the_law(case, monkeypatch):
         for kind, own in given.values():
             name = kind.name + RESPONSE
             slopes = found[0][name].reshape(-1, WIDTH)
-            carried, columns = jets_of(kind, own)
-            with _carried([kind.law]):
-                results = kind.law(*carried)
+            differentiate_by_jets, columns = jets_of(kind, own)
+            with use_jets([kind.law]):
+                results = kind.law(*differentiate_by_jets)
             results = dict(
                 zip(
                     kind.outputs, results if isinstance(results, tuple) else (results,), strict=True

@@ -58,7 +58,7 @@ def test_an_edited_function_is_compiled_anew(folder):
 def test_another_processor_gets_its_own_files(folder, monkeypatch):
     compile_function("answer", answer, 0)
     monkeypatch.setattr(
-        compiled_laws, "_describe_machine", lambda: ("linux", "x86_64", "new_instructions")
+        compiled_laws, "describe_machine", lambda: ("linux", "x86_64", "new_instructions")
     )
     assert load_function("answer", answer, 0) is None
 

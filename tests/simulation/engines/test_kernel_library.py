@@ -103,7 +103,7 @@ def test_the_next_process_computes_no_digest_again(library, tmp_path, monkeypatc
 def folder(tmp_path, monkeypatch):
     """Yield an empty folder of libraries."""
     monkeypatch.setattr(kernel_library, "LIBRARY_FOLDER", tmp_path)
-    monkeypatch.setattr(kernel_library, "_problems", [])
+    monkeypatch.setattr(kernel_library, "loading_problems", [])
     load_library.cache_clear()
     yield tmp_path
     load_library.cache_clear()

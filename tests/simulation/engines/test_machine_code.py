@@ -34,7 +34,7 @@ class Library:
 def sources(monkeypatch):
     """Yield a monkeypatch under which there is no source of machine code, until a test adds one."""
     monkeypatch.delenv(machine_code.VARIABLE, raising=False)
-    monkeypatch.setattr(machine_code, "_addresses", {})
+    monkeypatch.setattr(machine_code, "law_addresses", {})
     monkeypatch.setattr(kernel_library, "load_library", lambda: None)
     monkeypatch.setattr(machine_code, "find_compiler", lambda: None)
     monkeypatch.setattr(compiled_laws, "load_law", lambda name: None)

@@ -16,7 +16,7 @@ from osimlite.studies.sweep.optimize import Objective
 
 def test_a_measure_is_there_as_soon_as_it_is_registered(walker, monkeypatch):
     everything = {name: registry.find_measure(name) for name in registry.list_measure_names()}
-    monkeypatch.setattr(registry, "_MEASURES", everything)
+    monkeypatch.setattr(registry, "MEASURES", everything)
 
     @registry.register_measure(is_maximized=True)
     def lightness(engine, feet):
