@@ -35,6 +35,8 @@ GYRATION = Threshold(
     "largest-radius-of-gyration", 5.0, "m", "largest plausible radius of gyration of a body"
 )
 MASS = Threshold("largest-mass", 1000.0, "kg", "largest plausible mass of a body")
+LEAST_COMPARED_MASS_KG = 1e-6
+"""Least mass (kg) with which an inertia is compared; lighter bodies stand for rotors of motors."""
 
 
 @rule("OSIM501", "missing-mass", severity=ERROR, consequences=(REFUSES,))
@@ -191,7 +193,8 @@ def report_mass_out_of_proportion(subject: Subject, report: FindingCollector) ->
 
     Reports bodies heavier than a tonne. Also reports bodies whose radius of gyration is more than 5
     m: the square root of their largest moment of inertia divided by their mass. The mass would then
-    have to lie several metres from the mass center.
+    have to lie several metres from the mass center. Bodies lighter than a milligram may have any
+    inertia: they stand for the rotors of motors.
 
     Most often the unit is wrong: grams for kilograms, or kg mm^2 for kg m^2 (a million times as
     much). All forces of the model are then far too small to move its limbs.
@@ -213,7 +216,7 @@ def report_mass_out_of_proportion(subject: Subject, report: FindingCollector) ->
             )
     for body, moments in _list_inertias(subject):
         # Without a mass the radius has no meaning.
-        if not 0 < body.mass < math.inf:
+        if not LEAST_COMPARED_MASS_KG < body.mass < math.inf:
             continue
         radius = math.sqrt(max(moments[2], 0) / body.mass)
         if radius > widest:

@@ -25,7 +25,8 @@ def test_bodies_move_as_in_mujoco(mechanism, armature):
     made = osimlite.from_mjcf(mechanism, armature=armature)
     assert comparison.pose_errors(mechanism, made, 30) < 1e-12
     assert comparison.mass_errors(mechanism, made, 10) < 1e-12
-    assert osimlite.validate(made.model).ok
+    # Rotors have no mass, but the inertia of the armature.
+    assert not list(osimlite.validate(made.model))
 
 
 def test_y_up_turns_everything(mechanism):
