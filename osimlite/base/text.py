@@ -202,6 +202,29 @@ def suggest_or_list(word: str, candidates: Iterable[str], *more_candidates: str)
     return suggest_name(word, names) or (f"; expected {accepted_words}" if accepted_words else "")
 
 
+def append_clause(message: str, clause: str, *, separator: str = ";") -> str:
+    """Return a message with a further clause: ``"a; b"``, or ``"a? B"`` after a question.
+
+    Args:
+        message: sentence that may end with a suggestion or, if it comes from another library, with
+            a full stop.
+        clause: text after it, with a lower-case letter at the start unless it is a name.
+        separator: ";" or ":", which follows a message that is no question.
+    """
+    if message.endswith("?"):
+        return f"{message} {clause[:1].upper()}{clause[1:]}"
+    return f"{_remove_full_stop(message)}{separator} {clause}"
+
+
+def end_sentence(text: str) -> str:
+    """Return a text with one full stop at its end, or unchanged if it ends with a question."""
+    return text if text.endswith("?") else f"{_remove_full_stop(text)}."
+
+
+def _remove_full_stop(text: str) -> str:
+    return text if text.endswith("...") else text.removesuffix(".")
+
+
 def format_range(low: float, high: float, form: str) -> str:
     """Return ``"0.1 to 0.5"``; ``"0.3"`` if both numbers are formatted equally, ``"-"`` for NaN.
 

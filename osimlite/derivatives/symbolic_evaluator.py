@@ -7,6 +7,7 @@ from contextlib import nullcontext
 from functools import reduce
 from typing import Any
 
+from osimlite.base.text import append_clause
 from osimlite.derivatives import branches
 from osimlite.derivatives.constraints import make_constrained_dynamics
 from osimlite.derivatives.outputs import list_probe_items
@@ -297,7 +298,10 @@ class SymbolicEvaluator:
             )
             subject = f"'{path}'" if path else "the model"
             raise UnsupportedError(
-                f"{subject} has no formula for CasADi: {error}; set its appliesForce to false, or use another class"
+                append_clause(
+                    f"{subject} has no formula for CasADi: {error}",
+                    "set its appliesForce to false, or use another class",
+                )
             ) from error
 
     def _write_load_values(

@@ -79,15 +79,17 @@ def _check_thresholds(thresholds: Mapping[str, float]) -> None:
     Raises:
         OsimliteError: no rule has the threshold, or its value is not a number of 0 or more.
     """
-    from osimlite.base.text import suggest_name
+    from osimlite.base.text import append_clause, suggest_name
     from osimlite.lint.registry import all_rules
 
     names = [threshold.name for rule in all_rules() for threshold in rule.thresholds]
     for name, number in thresholds.items():
         if name not in names:
             raise OsimliteError(
-                f"no rule has a threshold '{name}'{suggest_name(name, names)} `osimlite rule CODE` "
-                "shows the thresholds of a rule"
+                append_clause(
+                    f"no rule has a threshold '{name}'{suggest_name(name, names)}",
+                    "`osimlite rule CODE` shows the thresholds of a rule",
+                )
             )
         if (
             # `bool` is a subclass of `int` in Python.

@@ -11,7 +11,7 @@ from typing import Any
 from osimlite.base.files import list_mesh_folders
 from osimlite.base.project import find_settings, parse_max_file_size
 from osimlite.base.records import dataclass, field
-from osimlite.base.text import join_words, suggest_name
+from osimlite.base.text import append_clause, join_words, suggest_name
 from osimlite.errors import OsimliteError
 from osimlite.lint.config import Config, parse_codes
 from osimlite.lint.diagnostic import Severity
@@ -98,7 +98,10 @@ def _parse_settings(file: Path, table: dict[str, Any]) -> Settings:
         if key not in _SETTINGS:
             setting_names = join_words(_SETTINGS, max_count=len(_SETTINGS))
             raise OsimliteError(
-                f"unknown setting '{key}'{suggest_name(key, _SETTINGS)} Settings are {setting_names}",
+                append_clause(
+                    f"unknown setting '{key}'{suggest_name(key, _SETTINGS)}",
+                    f"settings are {setting_names}",
+                ),
                 file=str(file),
             )
     try:

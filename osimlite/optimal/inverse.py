@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from osimlite.base.records import replace
-from osimlite.base.text import suggest_name
+from osimlite.base.text import append_clause, suggest_name
 from osimlite.fitting.modifying.operators import process_model
 from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.multibody import build_mechanism
@@ -102,10 +102,12 @@ def build_inverse_problem(
         )
         for label in table.columns:
             if label not in known_columns:
-                suggestion = suggest_name(label, known_columns)
                 raise context.invalid_error(
                     tool,
-                    f"'{label}' is not a state{suggestion}; set kinematics_allow_extra_columns to ignore it",
+                    append_clause(
+                        f"'{label}' is not a state{suggest_name(label, known_columns)}",
+                        "set kinematics_allow_extra_columns to ignore it",
+                    ),
                 )
     return problem
 

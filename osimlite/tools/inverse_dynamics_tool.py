@@ -9,7 +9,7 @@ import numpy as np
 
 from osimlite.base.progress import watch_items
 from osimlite.base.records import replace
-from osimlite.base.text import join_words, suggest_name
+from osimlite.base.text import append_clause, join_words, suggest_name
 from osimlite.errors import SettingError
 from osimlite.io.tables.storage import StoTable, expect_time_range
 from osimlite.mechanics.multibody import build_mechanism
@@ -64,7 +64,8 @@ def run_inverse_dynamics_tool(job: Job, outcome: Outcome) -> None:
         except SettingError as error:
             # As in OpenSim, an unknown name excludes nothing.
             outcome.add_message(
-                "forces to exclude", f"{error.message}; the name is ignored, as in OpenSim"
+                "forces to exclude",
+                append_clause(error.message, "the name is ignored, as in OpenSim"),
             )
     loads = job.find_path("external_loads_file")
     forces = force_elements(model, recorded.mechanism, external_loads=loads, folder=None)
@@ -143,7 +144,11 @@ def _find_reported_joints(job: Job, model: Model, outcome: Outcome) -> list[Join
         if name in joints_by_name:
             result.append(joints_by_name[name])
         else:
-            message = f"unknown joint '{name}'{suggest_name(name, joints_by_name)}: its loads are left out, as in OpenSim"
+            message = append_clause(
+                f"unknown joint '{name}'{suggest_name(name, joints_by_name)}",
+                "its loads are left out, as in OpenSim",
+                separator=":",
+            )
             outcome.add_message("joints_to_report_body_forces", message)
     return result
 

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from osimlite.base.text import append_clause
 from osimlite.errors import OsimliteError
 from osimlite.mechanics.multibody.mechanism import Mechanism
 
@@ -47,7 +48,9 @@ class PageServer:
             )
         except (OSError, OverflowError) as error:
             raise OsimliteError(
-                f"cannot listen at port {port}: {error}; choose another one by --port"
+                append_clause(
+                    f"cannot listen at port {port}: {error}", "choose another one by --port"
+                )
             ) from None
         self._thread = threading.Thread(target=self.server.serve_forever, daemon=True)
         self._thread.start()

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import ast
 import json
 import re
+from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -13,6 +16,8 @@ from rapidfuzz import fuzz
 from osimlite.base.text import (
     MAX_COMPARED_NAMES,
     add_article,
+    append_clause,
+    end_sentence,
     escape_control_sequences,
     escape_unprintable,
     find_nearest,
@@ -145,3 +150,95 @@ def test_spans_of_times() -> None:
     assert format_time_span(0.5, 2.0) == "between 0.5 and 2 s"
     assert format_time_span(5.0, float("inf")) == "after 5 s"
     assert format_time_span(float("-inf"), 0.1) == "before 0.1 s"
+
+
+@pytest.mark.parametrize(
+    ("message", "separator", "sentence"),
+    [
+        ("no body 'femr'", ";", "no body 'femr'; choose another"),
+        ("no body 'femr'", ":", "no body 'femr': choose another"),
+        ("no body; did you mean 'femur'?", ";", "no body; did you mean 'femur'? Choose another"),
+        ("no body; did you mean 'femur'?", ":", "no body; did you mean 'femur'? Choose another"),
+        ("port must be 0-65535.", ";", "port must be 0-65535; choose another"),
+        ("expected 1 2 ...", ";", "expected 1 2 ...; choose another"),
+    ],
+)
+def test_a_clause_after_a_suggestion_is_a_sentence(
+    message: str, separator: str, sentence: str
+) -> None:
+    assert append_clause(message, "choose another", separator=separator) == sentence
+
+
+def test_a_sentence_has_one_end() -> None:
+    assert end_sentence("no file") == end_sentence("no file.") == "no file."
+    assert end_sentence("did you mean 'a'?") == "did you mean 'a'?"
+
+
+SUGGESTING = {"suggest_name", "suggest_path", "suggest_or_list", "suggest_names", "add_suggestion"}
+
+
+def find_text_after_suggestions(tree: ast.Module) -> Iterator[int]:
+    """Yield the line of each f-string that continues after a message with a suggestion, or an error."""
+    for scope in ast.walk(tree):
+        if not isinstance(scope, ast.FunctionDef):
+            continue
+        nodes = list(ast.walk(scope))
+        # Names whose text may end with a question mark or a full stop.
+        names = {node.name for node in nodes if isinstance(node, ast.ExceptHandler)} | {
+            target.id
+            for node in nodes
+            if isinstance(node, ast.Assign)
+            for target in node.targets
+            if isinstance(target, ast.Name)
+            if "did you mean" in ast.unparse(node.value) or calls_suggestion(node.value)
+        }
+        for node in nodes:
+            if not isinstance(node, ast.JoinedStr):
+                continue
+            for part, after in zip(node.values, node.values[1:], strict=False):
+                if not isinstance(part, ast.FormattedValue) or not isinstance(after, ast.Constant):
+                    continue
+                value, text = part.value, str(after.value)
+                if (
+                    not text.startswith(" (")
+                    if calls_suggestion(value)
+                    else text[0] in ";:.,"
+                    and (
+                        (isinstance(value, ast.Name) and value.id in names)
+                        or (isinstance(value, ast.Attribute) and value.attr == "message")
+                    )
+                ):
+                    yield node.lineno
+
+
+ASSIGNED = re.compile(r"^ *except .* as (\w+):$|^ *(\w+) = .*(?:suggest_|did you mean|\($)", re.M)
+CONTINUED = re.compile(r"suggest_\w+\([^{}]*\)\}[^\"]|\.message\}[;:.,]|\{(\w+)\}[;:.,]")
+
+
+def may_continue(text: str) -> bool:
+    """Return whether a module is worth parsing, which takes long."""
+    continued = {match[1] for match in CONTINUED.finditer(text)}
+    return None in continued or any(
+        name in continued for pair in ASSIGNED.findall(text) for name in pair if continued
+    )
+
+
+def calls_suggestion(node: ast.AST) -> bool:
+    """Return whether an expression calls a function that returns a suggestion."""
+    return any(
+        isinstance(part, ast.Call)
+        and isinstance(part.func, ast.Name)
+        and part.func.id in SUGGESTING
+        for part in ast.walk(node)
+    )
+
+
+def test_no_message_continues_after_a_suggestion(repo: Path) -> None:
+    """``append_clause`` avoids "?;", "?:" and ".;"."""
+    wrong = [
+        f"{path.relative_to(repo)}:{line}"
+        for path in sorted((repo / "osimlite").rglob("*.py"))
+        if may_continue(text := path.read_text(encoding="utf-8"))
+        for line in find_text_after_suggestions(ast.parse(text))
+    ]
+    assert wrong == []

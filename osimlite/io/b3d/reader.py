@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from osimlite.base.files import expect_size, open_file
-from osimlite.base.text import format_count
+from osimlite.base.text import append_clause, format_count
 from osimlite.errors import DocumentError
 from osimlite.io.b3d.messages import HEADER, VERSION
 from osimlite.io.b3d.subject import RETRY, B3dPass, B3dSubject, B3dTrial, read_at
@@ -60,7 +60,7 @@ def read_b3d(path: str | Path) -> B3dSubject:
         header = decode_message(data, HEADER)
     except DamagedMessageError as error:
         raise DocumentError(
-            f"the header of the file is damaged: {error}; {RETRY}", file=file
+            append_clause(f"the header of the file is damaged: {error}", RETRY), file=file
         ) from None
     sensor, processed = header["sensor_frame_size"], header["pass_frame_size"]
     # 2. The trials: their frames follow each other without gaps.

@@ -17,7 +17,7 @@ import numpy as np
 
 from osimlite.base.files import open_file
 from osimlite.base.records import dataclass, field
-from osimlite.base.text import format_count
+from osimlite.base.text import append_clause, format_count
 from osimlite.errors import DocumentError, SettingError
 from osimlite.io.b3d.frames import decode_frames
 from osimlite.io.b3d.messages import (
@@ -197,7 +197,10 @@ class B3dTrial:
                     subject.check_sizes(block)
                 except DamagedMessageError as error:
                     raise DocumentError(
-                        f"the trial '{self.name}' is damaged in or after frame {first}: {error}; {RETRY}",
+                        append_clause(
+                            f"the trial '{self.name}' is damaged in or after frame {first}: {error}",
+                            RETRY,
+                        ),
                         file=str(subject.path),
                     ) from None
                 yield block

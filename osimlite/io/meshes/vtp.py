@@ -19,6 +19,7 @@ import numpy as np
 from lxml import etree
 from numpy.typing import NDArray
 
+from osimlite.base.text import append_clause
 from osimlite.errors import OsimliteError
 from osimlite.io.meshes.surface import (
     Array,
@@ -128,7 +129,8 @@ def _name_errors(name: str) -> Iterator[None]:
             yield
     except _Unreadable as problem:
         raise OsimliteError(
-            f"{problem}; save the mesh again as PolyData (.vtp) or as .obj", file=name
+            append_clause(str(problem), "save the mesh again as PolyData (.vtp) or as .obj"),
+            file=name,
         ) from None
 
 

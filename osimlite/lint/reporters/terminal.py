@@ -14,7 +14,7 @@ from typing import TypeVar
 
 from osimlite.base.named_tuples import NamedTuple
 from osimlite.base.patterns import compile_later
-from osimlite.base.text import escape_unprintable, join_words
+from osimlite.base.text import append_clause, escape_unprintable, join_words
 from osimlite.lint.diagnostic import Finding, Report, Severity
 
 _CODES = {
@@ -230,11 +230,12 @@ def render_concise(report: Report, *, colour: bool = False, everything: bool = F
 def _format_line(fold: Fold, colour: bool) -> str:
     finding = fold.first
     counts = (("like this", fold.more), ("in other files", fold.in_other_files))
-    fold_notes = "".join(
-        f"; {len(result)} more {relation}" for relation, result in counts if result
-    )
     hint = f" (did you mean '{finding.suggestion}'?)" if finding.suggestion is not None else ""
-    text = escape_unprintable(f"{finding.message}{hint}{fold_notes}")
+    text = f"{finding.message}{hint}"
+    for relation, result in counts:
+        if result:
+            text = append_clause(text, f"{len(result)} more {relation}")
+    text = escape_unprintable(text)
     severity = paint(finding.severity.value, finding.severity, colour)
     position = paint(escape_unprintable(finding.place), "strong", colour)
     return f"{position}: {severity} {finding.code} {text}"

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from math import isfinite
 
 from osimlite.base.patterns import compile_later
-from osimlite.base.text import format_count
+from osimlite.base.text import append_clause, format_count
 from osimlite.errors import ModelError
 from osimlite.lint.construction import CONSTRUCTION, Obstacle, Stage, obstacles_of
 from osimlite.lint.diagnostic import Severity
@@ -78,7 +78,7 @@ def report_unmet_constraint(subject: Subject, report: FindingCollector) -> None:
             subject,
             report,
             obstacle,
-            f"{obstacle.message}; OpenSim cannot start a simulation from this pose",
+            append_clause(obstacle.message, "OpenSim cannot start a simulation from this pose"),
         )
 
 
@@ -105,7 +105,10 @@ def report_range_not_kept(subject: Subject, report: FindingCollector) -> None:
     """
     for obstacle in _select_unreported(subject, report, Stage.CLAMP):
         _report_obstacle(
-            subject, report, obstacle, f"{obstacle.message}; OpenSim simulates without the clamp"
+            subject,
+            report,
+            obstacle,
+            append_clause(obstacle.message, "OpenSim simulates without the clamp"),
         )
 
 
@@ -139,7 +142,9 @@ def report_singular_mass_matrix(subject: Subject, report: FindingCollector) -> N
     if _has_error(report, "2456"):
         return
     for obstacle in _select_unreported(subject, report, Stage.INERTIA):
-        message = f"{obstacle.message}: OpenSim computes NaN, or meaningless accelerations"
+        message = append_clause(
+            obstacle.message, "OpenSim computes NaN, or meaningless accelerations", separator=":"
+        )
         _report_obstacle(subject, report, obstacle, message)
 
 
@@ -331,7 +336,10 @@ def report_impassable_obstacle(subject: Subject, report: FindingCollector) -> No
     """
     for obstacle in _select_unreported(subject, report, Stage.CABLE):
         _report_obstacle(
-            subject, report, obstacle, f"{obstacle.message}: OpenSim rejects the model"
+            subject,
+            report,
+            obstacle,
+            append_clause(obstacle.message, "OpenSim rejects the model", separator=":"),
         )
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from math import isfinite
 
 from osimlite.base.patterns import compile_later
-from osimlite.base.text import find_nearest
+from osimlite.base.text import append_clause, find_nearest
 from osimlite.io.document.lexical import ABSENT, UncleanText, make_converter
 from osimlite.io.document.names import ATTRIBUTE
 from osimlite.io.document.source import Source
@@ -313,8 +313,11 @@ def report_not_upgradable(subject: Subject, report: FindingCollector) -> None:
         if refusal.number in reported_numbers:
             continue
         report(
-            f"{refusal.message}: OpenSim cannot upgrade this document of version "
-            f"{subject.version} and rejects it",
+            append_clause(
+                refusal.message,
+                f"OpenSim cannot upgrade this document of version {subject.version} and rejects it",
+                separator=":",
+            ),
             number=refusal.number,
         )
 

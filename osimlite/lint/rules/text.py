@@ -7,6 +7,7 @@ import re
 from typing import Final
 
 from osimlite.base.patterns import compile_later
+from osimlite.base.text import append_clause
 from osimlite.errors import NotWellFormedError, VersionError
 from osimlite.io.document.parsing import is_binary
 from osimlite.io.document.source import Source
@@ -61,7 +62,7 @@ def report_syntax_error(subject: Subject, report: FindingCollector) -> None:
             _report_at(
                 subject.source,
                 report,
-                f"{fault.message}; {_describe_extent(subject)}",
+                append_clause(fault.message, _describe_extent(subject)),
                 fault.line,
                 fault.column,
             )

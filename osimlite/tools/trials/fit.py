@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from osimlite.base.text import append_clause
 from osimlite.errors import OsimliteError
 from osimlite.fitting.fitted_motion import MARKER_ERROR_LIMITS_M, FittedMotion
 from osimlite.fitting.inverse_kinematics import find_marker_stations
@@ -109,7 +110,7 @@ def measure_marker_errors(tool: TrialTool) -> Numbers:
         errors = tool.find_result(f"{setup.name}_ik_marker_errors.sto")
         if errors is None:
             raise MissingInput(
-                f"{error.message}; a file of marker errors is missing, too"
+                append_clause(error.message, "a file of marker errors is missing, too")
             ) from error
         yield from measure_written_errors(folder, errors)
         return
