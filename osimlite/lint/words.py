@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from osimlite.base.text import find_nearest, join_words
+from osimlite.base.text import find_nearest, group_by_side, join_words
 from osimlite.io.document.lexical import format_shortest
 from osimlite.schema.base import Object, Unknown
 
@@ -59,15 +59,21 @@ def find_nearest_name(text: str, valid_texts: list[str]) -> str | None:
         text: text that is not valid.
         valid_texts: candidates, among which the nearest is searched.
     """
+    for group in group_by_side(text, valid_texts):
+        if (nearest := _find_nearest_in_group(text, group)) is not None:
+            return nearest
+    return None
+
+
+def _find_nearest_in_group(text: str, valid_texts: list[str]) -> str | None:
     nearest_text = find_nearest(text, valid_texts, cutoff=70)
     last_name = text.rstrip("/").rpartition("/")[2]
-    by_last = {word.rpartition("/")[2]: word for word in reversed(valid_texts)}
-    nearest_last_name = find_nearest(last_name, by_last, cutoff=70)
-    if nearest_last_name is None:
+    last_names = {word: word.rpartition("/")[2] for word in valid_texts}
+    nearest_last_name = find_nearest(last_name, dict.fromkeys(last_names.values()), cutoff=70)
+    if nearest_last_name is None or last_names.get(nearest_text or "") == nearest_last_name:
         return nearest_text
-    if nearest_text is not None and nearest_text.rpartition("/")[2] == nearest_last_name:
-        return nearest_text
-    return by_last[nearest_last_name]
+    same_name = [word for word in valid_texts if last_names[word] == nearest_last_name]
+    return pick_closest(text, same_name)
 
 
 def suggest_names(unknown_texts: Iterable[str], valid_texts: Iterable[str]) -> str:

@@ -199,10 +199,8 @@ class Tree:
                 for component_path in self.by_path
                 if get_last_name(component_path) == get_last_name(f"/{path}")
             ]
-            better = (
-                f"; did you mean '{namesakes[0]}'?"
-                if namesakes
-                else suggest_name(path, self.by_path)
+            better = suggest_name(
+                path, namesakes or self.by_path, cutoff=0.0 if namesakes else 60.0
             )
             raise ModelError(f"no component at '{path}'{better}")
         return result

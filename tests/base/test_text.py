@@ -24,6 +24,7 @@ from osimlite.base.text import (
     format_json,
     format_time_span,
     measure_similarity,
+    suggest_path,
 )
 from osimlite.errors import OsimliteError
 
@@ -130,6 +131,37 @@ def test_the_nearest_name() -> None:
     assert find_nearest("tibia", ["femur_r", "tibia_l", "tibia_r"]) == "tibia_l"
     assert find_nearest("xyz", ["femur_r", "tibia_l"]) is None
     assert find_nearest("xyz", []) is None
+
+
+@pytest.mark.parametrize(
+    ("word", "names", "nearest"),
+    [
+        # The letter l of "angle" makes both legs equally similar.
+        ("mtp_l", ["mtp_angle_r", "mtp_angle_l"], "mtp_angle_l"),
+        ("vas_l", ["vas_lat_r", "vas_lat_l"], "vas_lat_l"),
+        ("add_r", ["add_brev_l", "add_mag33_r", "add_brev_r"], "add_brev_r"),
+        ("glmin2r_-P1", ["glmin2_l-P1", "glmin2_r-P1"], "glmin2_r-P1"),
+        ("ulna_r_geom", ["/bodyset/ulna_l/ulna_r_geom", "/b/ulna_r_geom"], "/b/ulna_r_geom"),
+        ("RHip_z", ["LHip_rz", "RHip_flexz"], "RHip_flexz"),
+        ("RASIS", ["LASI", "RASI_ant"], "RASI_ant"),
+        ("Left Toe", ["Right Toes", "Left Big Toe"], "Left Big Toe"),
+        ("hipR", ["hipsL", "hip_abdR"], "hip_abdR"),
+        ("kneeRight", ["kneesLeft", "kneesRight"], "kneesRight"),
+        # Names without a side are on none of the two.
+        ("lumbar_r", ["lumbar_bend_l", "lumbar", "lumbar_bend_r"], "lumbar"),
+        # Only the side is wrong, or the model has only the other side.
+        ("knee_angle_r", ["ankle_angle_r", "knee_angle_l"], "knee_angle_l"),
+        ("knee_angel_r", ["hip_flexion_r", "knee_angle_l"], "knee_angle_l"),
+    ],
+)
+def test_the_nearest_name_is_on_the_same_side(word: str, names: list[str], nearest: str) -> None:
+    assert find_nearest(word, names) == nearest
+    assert find_nearest(word, names[::-1]) == nearest
+
+
+def test_the_nearest_path_is_on_the_same_side() -> None:
+    states = ["/jointset/mtp_r/mtp_angle_r/value", "/jointset/mtp_l/mtp_angle_l/value"]
+    assert states[1] in suggest_path("/jointset/mtp_l/angle/value", states)
 
 
 @pytest.mark.parametrize(

@@ -77,7 +77,9 @@ def test_meshes_of_given_motions_are_refined(tmp_path):
 
 
 def test_columns_that_are_no_states_must_be_allowed(tmp_path):
-    with pytest.raises(OsimliteError, match=r"is not a state.*[Ss]et kinematics_allow_extra_columns"):
+    with pytest.raises(
+        OsimliteError, match=r"is not a state.*[Ss]et kinematics_allow_extra_columns"
+    ):
         build_inverse_problem(
             squat(tmp_path, kinematics_allow_extra_columns=False), folder=tmp_path
         )

@@ -152,6 +152,14 @@ def test_a_name_alone_is_answered_with_its_path(walker: Model) -> None:
         walker["RHip_rz"]
 
 
+def test_a_wrong_path_is_answered_with_one_of_the_same_side() -> None:
+    model = Model()
+    for side in "lr":
+        model.add(PinJoint(name=f"knee_{side}", coordinates=[Coordinate(name="flexion")]))
+    with pytest.raises(ModelError, match="did you mean '/jointset/knee_r/flexion'"):
+        model["/jointset/kne_r/flexion"]
+
+
 @pytest.mark.parametrize("function", ["mechanism", "to_urdf", "to_text", "simulate"])
 def test_a_path_in_place_of_a_model_is_told_to_be_read(function: str) -> None:
     with pytest.raises(
