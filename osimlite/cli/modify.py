@@ -168,9 +168,14 @@ def _summarize_differences(differences: list[Difference]) -> str:
     new_classes: Counter[tuple[str, str]] = Counter()
     changed_paths: dict[str, None] = {}
     changed_properties: dict[str, None] = {}
+    replaced_paths: set[str] = set()
     for path, property_name, old, new in differences:
         if property_name == "class":
             new_classes[old, new] += 1
+            replaced_paths.add(path)
+        # Properties that only one of two classes has come and go with the class.
+        elif property_name and path in replaced_paths and (old is None or new is None):
+            continue
         elif property_name:
             changed_paths[path] = None
             changed_properties[property_name] = None

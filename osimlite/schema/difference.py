@@ -85,8 +85,8 @@ class _Comparison:
             yield Difference(
                 path, property_path or "class", _describe_type(old), _describe_type(new)
             )
-            # An owned object of another class is reported as a whole. Of a component at its path
-            # the properties that both classes have are compared as well.
+            # An owned object of another class is reported as a whole. The properties of a component
+            # at its path are compared as well.
             if property_path:
                 return
         if isinstance(old, Unknown) or isinstance(new, Unknown):
@@ -95,13 +95,13 @@ class _Comparison:
                 # difference of the classes has been reported.
                 yield from _compare_contents(path, property_path, old.content, new.content)
             return
-        # If the classes differ, compare the properties that both have.
-        for spec in [
-            spec
-            for tag, spec in get_field_specs(type(new)).items()
-            if tag in get_field_specs(type(old))
-        ]:
-            child_path = f"{property_path}.{spec.tag}" if property_path else spec.tag
+        old_specs, new_specs = get_field_specs(type(old)), get_field_specs(type(new))
+        for tag, spec in (old_specs | new_specs).items():
+            child_path = f"{property_path}.{tag}" if property_path else tag
+            if tag not in new_specs or tag not in old_specs:
+                yield from self._report_unmatched_property(path, child_path, spec, old, new)
+                continue
+            spec = new_specs[tag]
             old_value, new_value = getattr(old, spec.name), getattr(new, spec.name)
             if isinstance(spec.kind, ObjectField):
                 yield from self._compare_owned(
@@ -122,6 +122,36 @@ class _Comparison:
                     yield Difference(path, child_path, *names)
             elif not _are_equal(old_value, new_value):
                 yield Difference(path, child_path, old_value, new_value)
+
+    def _report_unmatched_property(
+        self, path: str, property_path: str, spec: FieldSpec, old: Object, new: Object
+    ) -> Iterator[Difference]:
+        """Report a property that the class of only one of two objects has.
+
+        Yields:
+            The property as added or removed, unless it has its default value.
+        """
+        is_old = spec.tag in get_field_specs(type(old))
+        holder = old if is_old else new
+        tree = self.old if is_old else self.new
+        value = getattr(holder, spec.name)
+        if isinstance(spec.kind, ObjectField):
+            # Components are compared at their own paths.
+            objects = [
+                item
+                for item in _list_objects(value)
+                if tree is None or not isinstance(item, Component)
+            ]
+            defaults = _list_objects(spec.factory() if spec.factory is not None else None)
+            is_list = spec.kind.form == "list"
+            # Default objects are in no tree.
+            if any(_Comparison(None, None)._compare_owned("", "", is_list, defaults, objects)):
+                sides = (objects, []) if is_old else ([], objects)
+                yield from self._compare_owned(path, property_path, is_list, *sides)
+        elif not _are_equal(value, spec.default):
+            if isinstance(spec.kind, Reference):
+                value = self._canonicalize_reference(tree, holder, spec, value)
+            yield Difference(path, property_path, *((value, None) if is_old else (None, value)))
 
     def _compare_owned(
         self, path: str, property_path: str, are_named: bool, old: list[Object], new: list[Object]

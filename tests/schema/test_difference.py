@@ -42,17 +42,37 @@ def test_every_kind_of_change(walker: Model) -> None:
     ]
 
 
-def test_of_another_class_counts_what_both_have() -> None:
-    """Only properties that both classes have are compared.
-
-    Parts that a class creates itself are ignored.
-    """
+def test_another_class_and_what_both_have() -> None:
+    """Properties with their default values and parts that a class creates itself are ignored."""
     old, new = Model(name="m"), Model(name="m")
     old.add(osimlite.Thelen2003Muscle(name="soleus", max_isometric_force=100.0))
     new.add(osimlite.RigidTendonMuscle(name="soleus", max_isometric_force=200.0, min_control=0.01))
     assert find_differences(old, new) == [
         Difference("/forceset/soleus", "class", "Thelen2003Muscle", "RigidTendonMuscle"),
         Difference("/forceset/soleus", "max_isometric_force", 100.0, 200.0),
+    ]
+
+
+def test_another_class_and_what_only_one_has() -> None:
+    """Numbers, references and objects of one class are added or removed."""
+    transform = osimlite.SpatialTransform()
+    transform.rotation1.axis = (1.0, 1.0, 0.0)
+    old, new = Model(name="m"), Model(name="m")
+    for model in (old, new):
+        model.add(osimlite.Body(name="bone", mass=1.0))
+    old.add(osimlite.CoordinateActuator(name="motor", coordinate="knee", optimal_force=2.0))
+    new.add(osimlite.PointActuator(name="motor", body="bone", point=(1.0, 0.0, 0.0)))
+    old.add(osimlite.WeldJoint(name="hip"))
+    new.add(osimlite.CustomJoint(name="hip", spatial_transform=transform))
+    motor, hip = "/forceset/motor", "/jointset/hip"
+    assert find_differences(old, new) == [
+        Difference(hip, "class", "WeldJoint", "CustomJoint"),
+        Difference(hip, "SpatialTransform", None, "SpatialTransform"),
+        Difference(motor, "class", "CoordinateActuator", "PointActuator"),
+        Difference(motor, "coordinate", "knee", None),
+        Difference(motor, "optimal_force", 2.0, 1.0),
+        Difference(motor, "body", None, "/bodyset/bone"),
+        Difference(motor, "point", None, (1.0, 0.0, 0.0)),
     ]
 
 
