@@ -184,13 +184,18 @@ class Report:
     def __repr__(self) -> str:
         parts = ("error", self.errors), ("warning", self.warnings), ("remark", self.infos)
         counts = ", ".join(format_count(len(part), kind) for kind, part in parts)
-        lines = [f"Report: {counts} in {format_count(self.checked, 'file')}"]
+        lines = [f"Report: {counts} in {format_count(self.count_files(), 'file')}"]
         # The sort is stable: equal severities keep the order of the files.
         ranked = sorted(self.findings, key=lambda finding: finding.severity.rank)
         lines += [_shorten_line(str(finding)) for finding in ranked[:MAX_LISTED]]
         if (hidden_count := len(ranked) - MAX_LISTED) > 0:
             lines.append(f"... and {format_count(hidden_count, 'more finding')}")
         return "\n".join(lines)
+
+    def count_files(self) -> int:
+        """Return the number of files with findings; without findings, that of all checked files."""
+        # A setup names other files, such as tables, in which there are findings, too.
+        return len({finding.file for finding in self.findings}) or self.checked
 
     @property
     def errors(self) -> list[Finding]:

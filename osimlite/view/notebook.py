@@ -111,7 +111,7 @@ def findings(report: Report) -> str:
         ]
         for finding in rows
     )
-    heading = f"<div>{counts} in {format_count(report.checked, 'file')}</div>"
+    heading = f"<div>{counts} in {format_count(report.count_files(), 'file')}</div>"
     return heading + (
         _make_table(("", "code", "place", "message", "suggestion"), cells, len(rows))
         if rows

@@ -7,7 +7,9 @@ from shutil import copy
 
 import pytest
 
+from osimlite.lint.diagnostic import Finding, Report, Severity
 from osimlite.lint.engine import load_subject, run_rules
+from osimlite.lint.reporters.terminal import format_summary
 from tests.cli.command import run as command
 
 
@@ -65,7 +67,7 @@ def test_rules_are_selected_ignored_and_counted(project):
     assert found("--ignore", "table-count,OSIM803", "--fail-on", "warning")[1] == 1
     assert found("--select", "OSIM5")[0] == set()
     counts = command("validate", ".", "--statistics").out
-    assert "     2  OSIM802  table-count\n" in counts and counts.endswith("in 4 files.\n")
+    assert "     2  OSIM802  table-count\n" in counts and counts.endswith("in 3 files.\n")
 
 
 def test_settings_hold_for_tables_and_setups(project):
@@ -147,3 +149,17 @@ def test_mends_of_a_project(project):
     )
     assert found()[0] == {("ik.xml", "OSIM831"), ("ik.xml", "OSIM841")}
     assert found("--unsafe-fixes") == (set(), 0)
+
+
+def test_the_closing_line_counts_the_files_with_findings(project):
+    """A check of one setup may find errors in the tables that it names."""
+    done = command("validate", ".", "--format", "concise")
+    assert done.out.endswith(" in 3 files.\n")
+    alone = command("validate", "leg.mot", "leg.osim", "--format", "concise").out
+    assert alone.endswith(" in 1 file.\n")
+    assert command("validate", "leg.osim", "ik.xml", "--select", "OSIM5").out == (
+        "No findings in 2 files.\n"
+    )
+    tables = [Finding("OSIM802", "x", Severity.ERROR, "x", name) for name in ("a.mot", "b.trc")]
+    assert format_summary(Report(tables, checked=1)) == "Found 2 errors in 2 files."
+    assert "in 2 files" in repr(Report(tables, checked=1))

@@ -50,7 +50,8 @@ def format_summary(report: Report, colour: bool = False) -> str:
         for severity, count in counts
         if count
     ]
-    files = f"{report.checked} {_pluralize('file', report.checked)}"
+    file_count = report.count_files()
+    files = f"{file_count} {_pluralize('file', file_count)}"
     baseline_note = f" ({report.known} more in the baseline)" if report.known else ""
     if not parts:
         return paint(f"No findings in {files}{baseline_note}.", "good", colour)
