@@ -141,8 +141,7 @@ def _print_table_info(file: Path, show_all: bool) -> None:
     facts.add("markers" if table.is_markers else "columns besides time", str(len(table.columns)))
     if table.span is not None:
         first, last = table.span
-        # Times are rounded in the file, so the mean step is more exact than a single one.
-        rate = f", {(rows - 1) / (last - first):.4g} Hz" if last > first else ""
+        rate = f", {table.rate:.4g} Hz" if table.rate > 0.0 else ""
         facts.add("time", f"{first:g} to {last:g} s{rate}")
     elif rows:
         facts.add("time", "not readable in every row; see 'osimlite validate'")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import cached_property
 from itertools import islice, pairwise
+from math import inf
 from typing import ClassVar
 
 from osimlite.base.patterns import compile_later
@@ -15,6 +16,9 @@ from osimlite.lint.config import Config
 from osimlite.lint.diagnostic import Edit, Fix
 from osimlite.lint.scan import RowScanner, TableRows, parse_number
 from osimlite.lint.suppressions import Suppression, read_header_suppressions
+
+MAX_STEP_RATIO = 2.5
+"""Largest ratio of a step of time to the usual one; rounded times can double a step."""
 
 _CELL = compile_later(rb"[^ \t\r\n]+")
 _ROW = compile_later(rb"[^ \t\r\n][^\n]*")
@@ -147,6 +151,22 @@ class Table(CheckTarget):
         if len(times) < 2 or self.rows.select("time"):
             return 0
         return median(after - before for before, after in pairwise(times))
+
+    @cached_property
+    def rate(self) -> float:
+        """Rows per second, Hz; 0 if fewer than two rows have a time, or a row has none.
+
+        The mean of many steps is exact although times are rounded: 0, 0.017, 0.033, 0.050 are 60 Hz.
+        Gaps do not count.
+        """
+        if self.span is None or len(self.rows.times) < 2:
+            return 0.0
+        longest = MAX_STEP_RATIO * self.step if self.step > 0.0 else inf
+        steps = (after - before for before, after in pairwise(self.rows.times))
+        gaps = [step for step in steps if step > longest]
+        first, last = self.span
+        duration = last - first - sum(gaps)
+        return (len(self.rows.times) - 1 - len(gaps)) / duration if duration > 0.0 else 0.0
 
     def label_of(self, number: int) -> str:
         """Return the label of a column by its index; in a marker file that of its marker."""

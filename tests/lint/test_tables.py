@@ -14,6 +14,7 @@ from osimlite.lint.engine import load_subject, run_rules
 from osimlite.lint.many import check_files
 from osimlite.lint.scan import RowScanner
 from osimlite.lint.table import Table
+from tests.cli.command import run as command
 
 
 def numbers(draw: random.Random) -> str:
@@ -309,3 +310,54 @@ def test_numbers_beyond_the_largest_one(
     assert (finding.code, finding.severity.value) == ("OSIM807", severity)
     assert "largest number" in finding.message and (finding.line, finding.column) == (9, 5)
     assert finding.message.endswith("without a message") == (version == 1)
+
+
+MARKERS = """PathFileType	4	(X/Y/Z)	w.trc
+DataRate	CameraRate	NumFrames	NumMarkers	Units	OrigDataRate	OrigDataStartFrame	OrigNumFrames
+{rate}	{rate}	{count}	1	mm	{rate}	1	{count}
+Frame#	Time	RASI
+		X1	Y1	Z1
+
+{rows}"""
+
+
+def make_markers(rate: float, times: list[str]) -> Table:
+    """Return a marker file with a frame for each of the times."""
+    rows = "".join(f"{frame}\t{time}\t1\t2\t3\n" for frame, time in enumerate(times, 1))
+    return Table(MARKERS.format(rate=rate, count=len(times), rows=rows).encode(), "w.trc")
+
+
+@pytest.mark.parametrize(
+    ("rate", "indices", "digits"),
+    [
+        # The usual step of 60 Hz is 0.017 s if times are rounded to milliseconds.
+        (60.0, range(61), 3),
+        (100.0, range(61), 2),
+        # Steps of 0.01 and 0.02 s.
+        (75.0, range(301), 2),
+        # Several rows have equal times.
+        (1000.0, range(1001), 2),
+        # 20 frames are missing.
+        (120.0, [*range(40), *range(60, 121)], 4),
+    ],
+)
+def test_the_rate_of_rounded_times(rate: float, indices: list[int], digits: int) -> None:
+    table = make_markers(rate, [f"{index / rate:.{digits}f}" for index in indices])
+    assert table.rate == pytest.approx(rate, rel=2e-3)
+    assert "OSIM803" not in {finding.code for finding in run_rules(table).findings}
+
+
+def test_the_rate_of_few_times() -> None:
+    assert make_markers(60.0, []).rate == make_markers(60.0, ["0.5"]).rate == 0.0
+    assert make_markers(60.0, ["0.5", "0.5"]).rate == make_markers(60.0, ["0", "x"]).rate == 0.0
+
+
+def test_a_rule_and_info_print_the_same_rate(tmp_path: Path) -> None:
+    table = make_markers(100.0, [f"{index / 60:.3f}" for index in range(61)])
+    (message,) = [
+        finding.message for finding in run_rules(table).findings if finding.code == "OSIM803"
+    ]
+    assert message.endswith("the times of the frames give 60")
+    file = tmp_path / "w.trc"
+    file.write_bytes(table.data)
+    assert "0 to 1 s, 60 Hz" in command("info", str(file)).out

@@ -25,6 +25,8 @@ _FIRST_STATES = 0.03
 """Time that computed muscle control runs to find the states of muscles at the start, s."""
 _MIN_JOINTS = 4
 """Smallest number of joint angles that do not all stay near 0 during a motion."""
+_RATE_TOLERANCE = 1e-9
+"""Relative rounding error of a rate that is computed from times."""
 _USUAL_WINDOW = 0.01
 """Default window of computed muscle control, s."""
 
@@ -368,12 +370,12 @@ def report_filter_frequency(setup: Setup, report: FindingCollector) -> None:
             cutoff = getattr(item, filter_tag, -1.0)
             if cutoff == 0.0:
                 report(f"{describe_object(item)} filters the motion at 0 Hz", item, tag=filter_tag)
-            elif table.step > 0.0 and cutoff > 0.5 / table.step:
+            elif table.rate > 0.0 and cutoff > 0.5 * table.rate * (1.0 + _RATE_TOLERANCE):
                 report(
                     # The Nyquist frequency is half the sampling rate.
                     f"{describe_object(item)} filters at {cutoff:g} Hz, but "
-                    f"'{getattr(item, tag)}' has {1.0 / table.step:.4g} rows per second, so that the "
-                    f"cut-off frequency must be below {0.5 / table.step:.4g} Hz",
+                    f"'{getattr(item, tag)}' has {table.rate:.4g} rows per second, so that the "
+                    f"cut-off frequency must be below {0.5 * table.rate:.4g} Hz",
                     item,
                     tag=filter_tag,
                 )

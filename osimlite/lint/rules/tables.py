@@ -230,7 +230,7 @@ def report_table_count(table: Table, report: FindingCollector) -> None:
             ("nColumns", labels, "labels", severity_if_wrong),
         )
     # Rows that are odd have findings of their own, and may be the reason for the difference.
-    odd_rows = rows.select("row", "blank", "comment")
+    odd_rows = rows.select("row", "blank", "comment", "words")
     for key, count, row_kind, severity in counts:
         entry = table.entries.get(key)
         if entry is None or (row_kind in ("rows", "frames") and (odd_rows or not count)):
@@ -326,15 +326,17 @@ def report_table_setting(table: Table, report: FindingCollector) -> None:
                 at=rate.value.at,
                 severity=WARNING,
             )
-        # Times are rounded in most files, which moves the frequency by some per cent.
+        # Rounded times move the usual step by some per cent, and missing rows the mean one.
         elif (
             rate is not None
-            and table.step > 0
+            and table.step > 0.0
             and not 0.9 < float(rate.value.text) * table.step < 1.1
+            and table.rate > 0.0
+            and not 0.9 < float(rate.value.text) / table.rate < 1.1
         ):
             report(
                 f"'DataRate' is '{rate.value.text}', but the times of the frames give "
-                f"{1 / table.step:.6g}",
+                f"{table.rate:.4g}",
                 at=rate.value.at,
                 severity=INFO,
             )
