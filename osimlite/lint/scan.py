@@ -34,7 +34,7 @@ class RowFault(NamedTuple):
     """Fault in the rows of a table: its kind and column, its first position, and how often it occurs.
 
     `kind` is ``cell`` (no number), ``vector`` (a cell with too few or too many numbers), ``row``
-    (`number` of cells, `text` with details), ``comment``, ``blank``, ``order``, ``time`` (no
+    (`number` of cells, `text` with details), ``comment``, ``words`` (`text` without numbers), ``blank``, ``order``, ``time`` (no
     number), ``part`` (a part of a marker), ``zero`` (a marker at the origin) or ``frame`` (a wrong
     number). `others` is the number of further columns with such a fault, which are not reported.
     """
@@ -107,6 +107,9 @@ BLOCK_BYTES = 16_000
 
 _MAX_LINE_BYTES = 4_000_000
 """Length of a line, in bytes, above which recognising its shape would take too much memory."""
+_MAX_QUOTED_LENGTH = 40
+"""Largest number of letters of a line that a message quotes."""
+
 _SAMPLED_ROWS = 64
 """Number of rows at the beginning that are all samples; later rows are sampled ever more sparsely."""
 _MAX_SAMPLED_NUMBERS = 200_000
@@ -315,10 +318,12 @@ class RowScanner:
         rows = self.rows
         # Comments in tables are not allowed by OpenSim; these are the signs that other programs
         # begin them with.
-        if text.lstrip()[:1] in (b"#", b"/", b"%", b";") or (
-            _LETTER.search(text) and not _OF_ROW.search(text)
-        ):
+        if text.lstrip()[:1] in (b"#", b"/", b"%", b";"):
             self._note_fault("comment", 0, line, 0, b"")
+            return
+        if _LETTER.search(text) and not _OF_ROW.search(text):
+            words = _shorten(" ".join(text.decode("latin-1").split()))
+            self._note_fault("words", 0, line, 0, b"", words)
             return
         cells, count = self._split_cells(text)
         if count != self.cells:
@@ -497,6 +502,11 @@ class RowScanner:
             faults[kind, number] = RowFault(
                 kind, number, line, start + 1, max(1, len(cell)), description, times
             )
+
+
+def _shorten(text: str) -> str:
+    """Return a text, cut after `_MAX_QUOTED_LENGTH` letters."""
+    return text if len(text) <= _MAX_QUOTED_LENGTH else f"{text[:_MAX_QUOTED_LENGTH]}..."
 
 
 def _compute_shapes(block: bytes, layout: RowLayout) -> tuple[bytes, bool]:

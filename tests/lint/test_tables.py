@@ -361,3 +361,18 @@ def test_a_rule_and_info_print_the_same_rate(tmp_path: Path) -> None:
     file = tmp_path / "w.trc"
     file.write_bytes(table.data)
     assert "0 to 1 s, 60 Hz" in command("info", str(file)).out
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("# half of it", "OpenSim does not allow comments among the rows"),
+        ("end of data", "expected a row of numbers, found 'end of data'"),
+        ("x" * 50, f"expected a row of numbers, found '{'x' * 40}...'"),
+    ],
+)
+def test_a_line_that_is_no_row_is_named_for_what_it_is(line: str, message: str) -> None:
+    text = f"m\nversion=1\nnRows=2\nnColumns=2\nendheader\ntime\tknee\n0\t1\n{line}\n1\t2\n{line}\n"
+    (finding,) = run_rules(Table(text.encode(), "m.mot")).findings
+    assert finding.code == "OSIM806"
+    assert finding.message == f"{message}; the same in 1 more line"

@@ -55,8 +55,8 @@ def report_no_rows(table: Table, report: FindingCollector) -> None:
 def report_ragged_row(table: Table, report: FindingCollector) -> None:
     """A row of a table has the wrong number of cells.
 
-    Compares the cells of each row with the labels, and reports blank lines and comments between the
-    rows.
+    Compares the cells of each row with the labels, and reports blank lines, comments and other text
+    between the rows.
 
     OpenSim's older reader takes missing cells from the next line: from there on all numbers are in
     the wrong columns. The newer reader rejects the file. In marker files and tables of version 2
@@ -78,7 +78,7 @@ def report_ragged_row(table: Table, report: FindingCollector) -> None:
     ```
     """
     rows = table.rows
-    for fault in rows.select("row", "vector", "comment", "blank"):
+    for fault in rows.select("row", "vector", "comment", "words", "blank"):
         position = Position(fault.line, fault.column, fault.length)
         if fault.kind == "vector":
             count = len(split_vector(fault.text))
@@ -104,6 +104,11 @@ def report_ragged_row(table: Table, report: FindingCollector) -> None:
         elif fault.kind == "comment":
             report(
                 f"OpenSim does not allow comments among the rows{fault.describe_repeats('line')}",
+                at=position,
+            )
+        elif fault.kind == "words":
+            report(
+                f"expected a row of numbers, found '{fault.text}'{fault.describe_repeats('line')}",
                 at=position,
             )
         # Blank lines after the last row do no harm.
