@@ -83,8 +83,9 @@ class TrialVerdict(NamedTuple):
 
     @property
     def value_text(self) -> str:
-        """Value with its unit."""
-        return f"{_format_number(self.value)} {self.unit}".rstrip()
+        """Value with its unit; "-" without a value."""
+        unit = "" if isnan(self.value) else self.unit
+        return f"{_format_number(self.value)} {unit}".rstrip()
 
     @property
     def limits(self) -> str:
@@ -98,6 +99,9 @@ class TrialVerdict(NamedTuple):
 
 
 def _format_number(value: float) -> str:
+    """Return a number for the table of results; "-" for NaN, which stands for no value."""
+    if isnan(value):
+        return "-"
     if 0.0 < value < SMALLEST_PRINTED:
         return f"<{SMALLEST_PRINTED:g}"
     return f"{value:.3g}" if abs(value) < 1000.0 else f"{value:.0f}"

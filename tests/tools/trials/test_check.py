@@ -240,6 +240,25 @@ def test_the_command_shows_verdicts_and_exits_as_validate(tmp_path: Path, capsys
     }
 
 
+def test_a_missing_value_is_a_dash(tmp_path: Path) -> None:
+    """A tool writes NaN for times without a solution."""
+    tables(tmp_path)
+    file = tmp_path / "walk_Actuation_force.sto"
+    # The peak of FX is in the row of 0.5 s.
+    file.write_text(
+        "\n".join(
+            "\t".join(["0.5", "nan", *line.split("\t")[2:]])
+            if line.split("\t")[0].strip() == "0.5"
+            else line
+            for line in file.read_text().splitlines()
+        )
+    )
+    report = osimlite.check_trial(tmp_path, select="OSIM911")
+    verdict = next(row for row in report.verdicts if "the peak of FX " in row.of)
+    assert np.isnan(verdict.value) and verdict.verdict == "bad"
+    assert verdict.value_text == "-" and "nan" not in verdict.limits
+
+
 def test_a_folder_without_anything_of_a_trial_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(OsimliteError, match="this is not a trial"):
         osimlite.check_trial(tmp_path)
