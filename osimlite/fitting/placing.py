@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from osimlite.base.records import dataclass
-from osimlite.base.text import join_words
+from osimlite.base.text import format_time_span, join_words
 from osimlite.errors import SettingError
 from osimlite.fitting.fit_messages import describe_fit
 from osimlite.fitting.fitted_motion import FittedMotion
@@ -79,6 +79,7 @@ def place_markers(
         SettingError: the data have only one frame, the range has no frames, or a task has an
             unknown name.
     """
+    range_error = _describe_range_error(data, start, end)
     start = max(start, float(data.times[0]))
     end = min(end, float(data.times[-1]))
     is_in_range = (data.times >= start) & (data.times <= end)
@@ -88,10 +89,9 @@ def place_markers(
             "markers are averaged "
             "over a range of times, as in OpenSim; add a copy of the row with a later time"
         )
-    if not is_in_range.any() or not start < end:
+    if range_error:
         raise SettingError(
-            f"no frames of the static trial to average from {start:g} to {end:g} s; set a time range "
-            f"within {data.times[0]:g} to {data.times[-1]:g} s that begins before it ends"
+            f"{range_error}; set a time range within {data.times[0]:g} to {data.times[-1]:g} s"
         )
     # The pose is fitted to the mean of the frames, in which a marker that was missed once is NaN.
     mean = MarkerData(
@@ -129,6 +129,20 @@ def place_markers(
         )
         marker.location = tuple(location[:3].tolist())
     return MarkerPlacement(pose, removed, move_distances)
+
+
+def _describe_range_error(data: MarkerData, start: float, end: float) -> str:
+    """Return why markers cannot be averaged from one time to another (s); empty if they can be."""
+    first, last = data.times[0], data.times[-1]
+    if not start < end:
+        return f"the time range starts at {start:g} s and must end later, but it ends at {end:g} s"
+    if start >= last:
+        return f"the static trial ends at {last:g} s, and the time range starts at {start:g} s"
+    if end <= first:
+        return f"the static trial starts at {first:g} s, and the time range ends at {end:g} s"
+    if not ((data.times >= start) & (data.times <= end)).any():
+        return f"the static trial has no frame {format_time_span(start, end)}"
+    return ""
 
 
 def _get_pose_speed(info: CoordinateInfo) -> float:

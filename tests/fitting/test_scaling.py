@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import re
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,9 @@ import pytest
 
 import osimlite
 from osimlite.errors import ModelError, OsimliteError, SettingError
+from osimlite.fitting.marker_data import MarkerData
 from osimlite.fitting.measuring import select_frames
+from osimlite.fitting.placing import place_markers
 from osimlite.fitting.scale_tool import compute_scaled_model
 from osimlite.fitting.scaling import get_scale_rules, scale_model
 from osimlite.io.tables.storage import read_sto
@@ -202,6 +205,21 @@ def test_what_cannot_be_scaled_is_told() -> None:
     )
     with pytest.raises(ModelError, match="use one factor for all its axes"):
         scale_model(slider, {"ground": (1.0, 2.0, 1.0)})
+
+
+@pytest.mark.parametrize(
+    ("start", "end", "message"),
+    [
+        (3.0, 4.0, "the static trial ends at 2 s, and the time range starts at 3 s; set"),
+        (-2.0, -1.0, "the static trial starts at 0 s, and the time range ends at -1 s; set"),
+        (2.0, 1.0, "starts at 2 s and must end later, but it ends at 1 s; set"),
+        (1.0, 1.0, "starts at 1 s and must end later, but it ends at 1 s; set"),
+        (0.2, 0.8, "the static trial has no frame between 0.2 and 0.8 s; set"),
+    ],
+)
+def test_a_range_without_frames_is_explained(start: float, end: float, message: str) -> None:
+    with pytest.raises(SettingError, match=re.escape(message)):
+        place_markers(body_model(), MarkerData.from_arrays(STATIC, None), [], start, end)
 
 
 @pytest.mark.parametrize(
