@@ -207,3 +207,12 @@ def test_the_reference_tells_of_all_that_the_package_exports() -> None:
     for exported in (getattr(osimlite, name) for name in osimlite.FUNCTIONS):
         name = f"{exported.__module__}.{exported.__name__}"
         assert f"::: {name}\n" in told or f"::: {exported.__module__}\n" in told, name
+
+
+def test_pages_to_run_unchanged_make_all_their_files_visibly() -> None:
+    """A reader does not see comments that create files."""
+    for page in PAGES:
+        text = " ".join((ROOT / page).read_text(encoding="utf-8").split())
+        assert not (
+            "run the commands of the tables unchanged" in text and _PREPARED.search(text)
+        ), page
