@@ -247,10 +247,11 @@ def test_long_chains_by_both_routes(seed, lengths):
 
 
 # --------------------------------------------------------------------------------------------------- errors
-def test_wholly_locked_mechanism_stands_still():
+@pytest.mark.parametrize("fixed_step", [None, 1e-3])
+def test_wholly_locked_mechanism_stands_still(fixed_step):
     model = chain("PinJoint")
     next(iter(model.components(Coordinate))).locked = True
-    trajectory = osimlite.simulate(model, to=0.1)
+    trajectory = osimlite.simulate(model, to=0.1, engine="bullet", fixed_step=fixed_step)
     assert not trajectory.values.any() and not trajectory.speeds.any()
 
 

@@ -202,8 +202,13 @@ class World:
         Returns:
             Values and rates of the joints.
         """
-        states = bullet.getJointStates(self.id, self._indices, self.client)
+        states = self._read_joint_states()
         return [state[0] for state in states], [state[1] for state in states]
+
+    def _read_joint_states(self) -> Sequence[Sequence[Any]]:
+        """Return Bullet's state of each joint: value, rate, and others."""
+        # Bullet returns None for no joints, which all models with only locked coordinates have.
+        return bullet.getJointStates(self.id, self._indices, self.client) or ()
 
     def step(self, h: float, forces: Sequence[float]) -> None:
         """Take one of Bullet's steps.
@@ -236,7 +241,7 @@ class World:
         # A step of 1 s from these rates changes them by the acceleration (semi-implicit Euler).
         self.set_state(q, rates)
         self.step(1.0, forces)
-        states = bullet.getJointStates(self.id, self._indices, self.client)
+        states = self._read_joint_states()
         return [state[1] - rate for state, rate in zip(states, rates, strict=True)]
 
     def close(self) -> None:
