@@ -77,13 +77,21 @@ def angles_xyz(rotation: Array) -> Array:
 
     The second angle is from -90 to 90 degrees.
     """
-    r13 = rotation[..., 0, 2]
-    first = np.arctan2(-rotation[..., 1, 2], rotation[..., 2, 2])
-    third = np.arctan2(-rotation[..., 0, 1], rotation[..., 0, 0])
-    # At a right angle only the sum (or difference) of the others is determined: set the third to 0.
-    is_straight = np.abs(r13) > 1.0 - 1e-14
+    r13, r23, r33 = (rotation[..., k, 2] for k in range(3))
+    # Near a right angle the cosine has all digits, but arcsin(r13) only half of them.
+    cosine = np.hypot(r23, r33)
+    first, second = np.arctan2(-r23, r33), np.arctan2(r13, cosine)
+    sin, cos = np.sin(first), np.cos(first)
+    # The third angle is that of the rotation without the first one. Near a right angle, rounding
+    # errors of the entries change the first angle, and this one compensates for them.
+    third = np.arctan2(
+        cos * rotation[..., 1, 0] + sin * rotation[..., 2, 0],
+        cos * rotation[..., 1, 1] + sin * rotation[..., 2, 1],
+    )
+    # At a right angle only the sum (or difference) of the others is determined: OpenSim sets the
+    # third to 0, and this is its limit.
+    is_straight = cosine <= 4.0 * np.finfo(float).eps
     alone = np.arctan2(rotation[..., 1, 0], rotation[..., 1, 1]) * np.copysign(1.0, r13)
-    second = np.arcsin(np.clip(r13, -1.0, 1.0))
     return np.stack(
         [np.where(is_straight, alone, first), second, np.where(is_straight, 0.0, third)], axis=-1
     )

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from osimlite.mechanics.multibody.spatial import (
@@ -43,18 +43,38 @@ def test_quaternions_turn_as_their_rotations(angles, third):
     rotation = rotation_xyz(angles)
     w, *v = quaternion_of(rotation)
     about = skew_matrix(np.array(v))
-    assert np.eye(3) + 2.0 * about @ (w * np.eye(3) + about) == pytest.approx(rotation, abs=1e-15)
+    # Of two million random rotations, five differ by 9 units of 2^-53, which is just below 1e-15.
+    assert np.eye(3) + 2.0 * about @ (w * np.eye(3) + about) == pytest.approx(rotation, abs=2e-15)
     assert quaternion_of(np.array([np.eye(3), rotation]))[1] == pytest.approx((w, *v), abs=0.0)
 
 
+# Near a right angle, 1 - |sine| has few digits of the second angle, and rounding errors are large in
+# the other two.
+@example(np.array((2.14, 0.0, 2.8)), np.pi / 2 - 1.3e-7)
+@example(np.array((0.3, 0.0, 0.25)), -1.5707963)
+@example(np.array((0.3, 0.0, 0.25)), np.pi / 2 - 1e-12)
+@example(np.array((0.3, 0.0, 0.25)), np.pi / 2 - 5e-16)
 @given(vectors, st.sampled_from([None, -np.pi / 2, np.pi / 2]))
 def test_angles_of_a_rotation_make_that_rotation(angles, second):
     if second is not None:
         angles[1] = second
-    rotation = rotation_xyz(angles)
-    result = angles_xyz(rotation)
-    assert abs(result[1]) <= np.pi / 2
-    assert rotation_xyz(result) == pytest.approx(rotation, abs=1e-7 if second is None else 1e-14)
+    exact, other = rotation_xyz(angles), rotation_xyz(np.array((0.4, 0.5, 0.6)))
+    for rotation in (exact, other.T @ (other @ exact)):  # without and with rounding errors
+        result = angles_xyz(rotation)
+        assert abs(result[1]) <= np.pi / 2
+        assert rotation_xyz(result) == pytest.approx(rotation, abs=1e-14)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_angles_near_a_right_angle_are_those_of_opensim(sign):
+    """OpenSim 4.6 returns these angles; from 4 machine epsilons to the right angle, it sets the third to zero."""
+    for distance in (1e-6, 1.3e-7, 2.7e-8, 1e-12, 1e-15):
+        angles = np.array((0.3, sign * (np.pi / 2 - distance), 0.25))
+        assert angles_xyz(rotation_xyz(angles)) == pytest.approx(angles, abs=1e-15, rel=0.0)
+    for distance in (0.0, 5e-16):
+        angles = np.array((0.3, sign * (np.pi / 2 - distance), 0.25))
+        expected = (0.3 + sign * 0.25, sign * (np.pi / 2 - distance), 0.0)
+        assert angles_xyz(rotation_xyz(angles)) == pytest.approx(expected, abs=1e-15, rel=0.0)
 
 
 def test_a_rotation_keeps_its_axis_and_turns_the_right_way():
