@@ -129,16 +129,28 @@ def find_angles(rotations: Array) -> Array:
     The angles are those of Rz(a) Rx(b) Ry(c). They continue from frame to frame without jumps by
     360 degrees. Where b is a right angle, c is 0.
     """
-    # Element (2, 1) of Rz Rx Ry is sin(b); rounding may exceed 1.
-    b = np.arcsin(np.clip(rotations[:, 2, 1], -1.0, 1.0))
-    is_locked = np.hypot(rotations[:, 2, 0], rotations[:, 2, 2]) < 1e-9
+    # Element (2, 1) of Rz Rx Ry is sin(b), and cos(b) is the length of its column without it. Near a
+    # right angle cos(b) has all digits, but arcsin only half of them.
+    cosine = np.hypot(rotations[:, 0, 1], rotations[:, 1, 1])
+    b = np.arctan2(rotations[:, 2, 1], cosine)
+    # At a right angle only a + c or a - c is determined.
+    is_locked = cosine < 1e-9
     a = np.where(
-        # cos(b) is the length of the row without it: at 0 only a + c is determined.
         is_locked,
         np.arctan2(rotations[:, 1, 0], rotations[:, 0, 0]),
         np.arctan2(-rotations[:, 0, 1], rotations[:, 1, 1]),
     )
-    c = np.where(is_locked, 0.0, np.arctan2(-rotations[:, 2, 0], rotations[:, 2, 2]))
+    # c is the angle of the rotation without a. Near a right angle, rounding errors of the elements
+    # change a, and c compensates for them.
+    sin, cos = np.sin(a), np.cos(a)
+    c = np.where(
+        is_locked,
+        0.0,
+        np.arctan2(
+            cos * rotations[:, 0, 2] + sin * rotations[:, 1, 2],
+            cos * rotations[:, 0, 0] + sin * rotations[:, 1, 0],
+        ),
+    )
     # `unwrap` removes jumps by full turns.
     angles = np.unwrap(np.stack([a, b, c], axis=1), axis=0)
     return np.asarray(np.degrees(angles), dtype=float)

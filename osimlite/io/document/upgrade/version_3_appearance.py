@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import asin, atan2, cos, hypot, sin
+from math import atan2, cos, hypot, sin
 
 from osimlite.io.document.upgrade.draft import (
     Draft,
@@ -160,12 +160,18 @@ def _parse_transform(text: str | None) -> tuple[Axes, Vector]:
 
 def _compute_angles(axes: Axes) -> Vector:
     """Return body-fixed X-Y-Z angles; if the middle one is a right angle, the last is zero."""
-    (xx, _, _), (yx, yy, yz), (sine, zy, zz) = axes
-    middle = asin(max(-1.0, min(1.0, sine)))
+    (_, xy, xz), (_, yy, yz), (sine, zy, zz) = axes
+    # Near a right angle the cosine has all digits, but asin(sine) only half of them.
+    cosine = hypot(zy, zz)
+    middle = atan2(sine, cosine)
     # At a right angle (gimbal lock) only the sum of the other two is known.
-    if abs(sine) > 1 - 4 * _EPSILON:
+    if cosine <= 4 * _EPSILON:
         return atan2(yz, yy), middle, 0.0
-    return atan2(-zy, zz), middle, atan2(-yx, xx)
+    # The last angle is that of the rotation without the first one, and compensates for its rounding
+    # error, which is large near a right angle.
+    first = atan2(-zy, zz)
+    s, c = sin(first), cos(first)
+    return first, middle, atan2(c * xy + s * xz, c * yy + s * yz)
 
 
 def hide_appearance(draft: Draft) -> None:

@@ -17,6 +17,7 @@ from osimlite.io.document.printer import to_text
 from osimlite.io.document.reader import Document, read_document, read_text
 from osimlite.io.document.source import Source
 from osimlite.io.document.upgrade import list_steps
+from osimlite.io.document.upgrade.version_3_appearance import compose_transforms
 from osimlite.schema.base import Object
 from osimlite.schema.model import CURRENT_VERSION, Model
 
@@ -389,6 +390,25 @@ def test_actuators_without_a_version_push_backwards_as_in_opensim() -> None:
         (-1.0, 0.0, 0.0),
         (0.0, 0.0, -1.0),
     )
+
+
+@pytest.mark.parametrize(
+    ("outer", "inner", "angles"),
+    [
+        ("0.3 1.5707963 0", "0 0 0.25", (0.3, 1.5707963, 0.25)),
+        ("0.3 -1.5707963 0", "0 0 0.25", (0.3, -1.5707963, 0.25)),
+        ("0.3 1.5707963267948966 0", "0 0 0.25", (0.55, 1.5707963267948966, 0.0)),
+        ("0 1.5707963 0", "0.3 0 0.25", (1.57079624017428, 1.2707963267948954, -1.320796236124628)),
+    ],
+)
+def test_transforms_near_a_right_angle_are_composed_as_in_opensim(
+    outer: str, inner: str, angles: tuple[float, ...]
+) -> None:
+    """The angles are those of OpenSim 4.6."""
+    composed = compose_transforms(f"{outer} 0 0 0", f"{inner} 0 0 0")
+    assert composed is not None
+    # An entry of the product has a rounding error of 1e-16 beside a cosine of 2.7e-8.
+    assert [float(word) for word in composed[0].split()] == pytest.approx(angles, abs=1e-8)
 
 
 def test_the_steps_of_version_4_need_one_module_only() -> None:
