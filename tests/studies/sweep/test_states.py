@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import Phase, given, settings
+from hypothesis import Phase, example, given, settings
 from hypothesis import strategies as st
 
 from osimlite.simulation import Simulation
@@ -34,13 +34,37 @@ def all_of_them(run):
     return sum(run.end[path] for path in run.engine.state.paths)
 
 
-@settings(max_examples=3, deadline=None, derandomize=True, phases=[Phase.generate])
+def release_frames(random, bushing):
+    """Unlock a coordinate between the frames of a bushing, which dissipates nothing if they are locked to each other.
+
+    Args:
+        random: random model with the bodies of the bushing.
+        bushing: its frames are two bodies, or a body and ground.
+
+    Returns:
+        First coordinate of the joint between the outer body of the bushing and its parent.
+    """
+    frames = (bushing.socket_frame1, bushing.socket_frame2)
+    # The parent of a body is ground or an earlier body.
+    outer = max(
+        number for number, body in enumerate(random.bodies) if f"/bodyset/{body.name}" in frames
+    )
+    coordinate = next(item for item in random.coordinates if item.name == f"q{outer}_0")
+    coordinate.locked = False
+    return coordinate
+
+
+# Hypothesis draws other seeds after a change of this test or of Hypothesis, therefore any seed has
+# to pass.
+@settings(max_examples=3, deadline=None, derandomize=True, phases=[Phase.explicit, Phase.generate])
 @given(seed=st.integers(0, 10**6))
+@example(seed=300).via("a locked joint between the frames of the bushing")
+@example(seed=356).via("all coordinates locked")
 def test_random_models_keep_their_states_through_an_interruption(seed, tmp_path_factory):
     folder = tmp_path_factory.mktemp("sweep")
     random = RandomModel(seed)
-    random.model.add(random.bushing("bushing"))
-    coordinate = next(item for item in random.coordinates if not item.locked)
+    bushing = random.model.add(random.bushing("bushing"))
+    coordinate = release_frames(random, bushing)
     vary = {coordinate.name: (-0.2, 0.2), "/forceset/bushing/rotational_damping/1": (0.1, 0.5)}
     with Simulation(random.model, "compiled") as simulation:
         paths = simulation.state.paths
@@ -55,7 +79,6 @@ def test_random_models_keep_their_states_through_an_interruption(seed, tmp_path_
     assert resumed.before > 0 and resumed.path.read_bytes() == whole.read_bytes()
     table, values = pq.read_table(whole).to_pydict(), chosen.make_block(0, 16)
     theirs = Runner(replace(made, engine="bullet")).run(values[3:4]).measures
-    bushing = random.model.tree().by_path["/forceset/bushing"]
     x, _, z = bushing.rotational_damping
     bushing.rotational_damping = (x, values[3, 1], z)
     with Simulation(random.model, "compiled") as simulation:
