@@ -111,51 +111,11 @@ same endings, so that 'ScrewJoint' and 'FreeJoint' reach 74 %.
 """
 
 
-_SIDE = compile_later(
-    # At the start of a word: knee_r, R.Heel, RHip, rightKnee.
-    r"(?<![A-Za-z])(?:[RLrl]|(?i:right|left))(?![a-z])"
-    # At the end of a word that begins with other letters: hipR, kneeRight.
-    r"|(?<=[a-z0-9])(?:[RL](?![A-Za-z])|(?:Right|Left)(?![a-z]))"
-)
-"""Part of a name that says on which side of the body its object is."""
-
-_OTHER_SIDES = {
-    side: other
-    for pair in (("r", "l"), ("R", "L"), ("right", "left"), ("Right", "Left"), ("RIGHT", "LEFT"))
-    for side, other in (pair, pair[::-1])
-}
-
-
-def _find_side(name: str) -> str:
-    """Return the side of the body that a name states last, "r" or "l"; empty if it states none."""
-    sides = _SIDE.findall(name)
-    return sides[-1][0].lower() if sides else ""
-
-
-def group_by_side(word: str, names: list[str]) -> list[list[str]]:
-    """Return groups of names to compare with a word, one after the other.
-
-    A user who types the name of a right muscle means a right one: names of the other side are
-    compared only if no other name is similar, or if the word differs in nothing but the side.
-
-    Args:
-        word: unknown name or path.
-        names: known names or paths.
-    """
-    side = _find_side(word)
-    if not side:
-        return [names]
-    mirrored = _SIDE.sub(lambda match: _OTHER_SIDES.get(match[0], match[0]), word).lower()
-    mirror_images = [name for name in names if name.lower() == mirrored]
-    same_side = [name for name in names if _find_side(name) in (side, "")]
-    return [mirror_images] if mirror_images else [same_side, names]
-
-
 def find_nearest(word: str, candidates: Iterable[str], *, cutoff: float = 60.0) -> str | None:
     """Return the known name that is most similar to `word`, or None if none is similar.
 
     Case and a namespace before a colon are ignored. Names of the same side of the body are
-    preferred, see :func:`group_by_side`.
+    preferred, see :func:`osimlite.base.sides.group_by_side`.
 
     Args:
         word: unknown name.
@@ -167,6 +127,9 @@ def find_nearest(word: str, candidates: Iterable[str], *, cutoff: float = 60.0) 
         same_letters = [name for name in names if name.lower() == exact.lower()]
         if same_letters:
             return same_letters[0]
+    # Most commands suggest nothing.
+    from osimlite.base.sides import group_by_side
+
     for group in group_by_side(word, names):
         nearest = _find_most_similar(word, group, cutoff)
         if nearest is not None:
@@ -263,16 +226,8 @@ def append_clause(message: str, clause: str, *, separator: str = ";") -> str:
     """
     if message.endswith("?"):
         return f"{message} {clause[:1].upper()}{clause[1:]}"
-    return f"{_remove_full_stop(message)}{separator} {clause}"
-
-
-def end_sentence(text: str) -> str:
-    """Return a text with one full stop at its end, or unchanged if it ends with a question."""
-    return text if text.endswith("?") else f"{_remove_full_stop(text)}."
-
-
-def _remove_full_stop(text: str) -> str:
-    return text if text.endswith("...") else text.removesuffix(".")
+    end = "" if message.endswith("...") else "."
+    return f"{message.removesuffix(end)}{separator} {clause}"
 
 
 def format_range(low: float, high: float, form: str) -> str:

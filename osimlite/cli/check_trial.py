@@ -42,7 +42,6 @@ def check_trial(
     Example: osimlite check-trial subject01
     """
     from osimlite.base.records import replace
-    from osimlite.base.text import end_sentence
     from osimlite.cli._console import print_for_programs, say, show, wants_colour
     from osimlite.cli._progress import progress_bar
     from osimlite.cli._validating import check_option_values, get_terminal_width
@@ -71,7 +70,8 @@ def check_trial(
         width = min(max(get_terminal_width(), 40), 120)
         show(render(visible, format, colour=wants_colour(), width=width, everything=everything))
         for reason in report.unchecked:
-            say(end_sentence(f"Not checked: {reason}"))
+            # A reason may end with a suggestion.
+            say(f"Not checked: {reason}" if reason.endswith("?") else f"Not checked: {reason}.")
     raise SystemExit(int(bool(report.at_least(Severity(fail_on or Severity.WARNING)))))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from osimlite.base.text import find_nearest, group_by_side, join_words
+from osimlite.base.text import find_nearest, join_words
 from osimlite.io.document.lexical import format_shortest
 from osimlite.schema.base import Object, Unknown
 
@@ -59,6 +59,8 @@ def find_nearest_name(text: str, valid_texts: list[str]) -> str | None:
         text: text that is not valid.
         valid_texts: candidates, among which the nearest is searched.
     """
+    from osimlite.base.sides import group_by_side
+
     for group in group_by_side(text, valid_texts):
         if (nearest := _find_nearest_in_group(text, group)) is not None:
             return nearest

@@ -17,7 +17,6 @@ from osimlite.base.text import (
     MAX_COMPARED_NAMES,
     add_article,
     append_clause,
-    end_sentence,
     escape_control_sequences,
     escape_unprintable,
     find_nearest,
@@ -199,11 +198,6 @@ def test_a_clause_after_a_suggestion_is_a_sentence(
     message: str, separator: str, sentence: str
 ) -> None:
     assert append_clause(message, "choose another", separator=separator) == sentence
-
-
-def test_a_sentence_has_one_end() -> None:
-    assert end_sentence("no file") == end_sentence("no file.") == "no file."
-    assert end_sentence("did you mean 'a'?") == "did you mean 'a'?"
 
 
 SUGGESTING = {"suggest_name", "suggest_path", "suggest_or_list", "suggest_names", "add_suggestion"}
