@@ -14,6 +14,7 @@ from osimlite.cli._progress import motion_bar, progress_bar
 
 if TYPE_CHECKING:
     from osimlite.schema.model import Model
+    from osimlite.simulation.run import Simulation
     from osimlite.simulation.trajectory import Trajectory
 
 LIVE_STEP_S = 1e-3
@@ -133,6 +134,8 @@ def simulate(
             complain(
                 f"{ending} at {trajectory.times[-1]:.6g} s of {to:g} s; the motion up to there is saved in '{results}'"
             )
+            if earlier is None:
+                _warn_of_deep_contacts(simulation, trajectory, file)
             _describe_run(trajectory, write_results(trajectory, results), model).show()
             if is_failure:
                 raise
@@ -155,6 +158,8 @@ def simulate(
                     progress=bar,
                 )
 
+        if earlier is None:
+            _warn_of_deep_contacts(simulation, trajectory, file)
         files = write_results(trajectory, results, plot=plot, film=film if animate else None)
         _describe_run(trajectory, files, model).show()
         # The window stays open until the user closes it.
@@ -275,6 +280,30 @@ def _find_soft_contacts(model: Model) -> list[str]:
         and force.appliesForce
         and any(item.stiffness == 0.0 for item in force.contact_parameters.objects)
     ]
+
+
+def _warn_of_deep_contacts(simulation: Simulation, trajectory: Trajectory, file: Path) -> None:
+    """Warn on standard error of contact surfaces that start inside each other, as OSIM521 does.
+
+    Args:
+        simulation: simulation with the forces of the model.
+        trajectory: motion, from the start of the simulation.
+        file: file of the model, for the message.
+    """
+    from osimlite.simulation.initial_contacts import find_deep_contacts
+
+    # The rule is about the default pose, and --set or --states may have moved the model.
+    contacts = find_deep_contacts(
+        simulation.forces, trajectory.mechanism, trajectory.values[0], float(trajectory.times[0])
+    )
+    if contacts:
+        deepest = contacts[0]
+        others = f", and {len(contacts) - 1} more like this" if len(contacts) > 1 else ""
+        complain(
+            f"warning: sphere '{deepest.sphere}' starts {1000.0 * deepest.depth:.3g} mm inside "
+            f"'{deepest.surface}'{others}, which may throw the model up (OSIM521); "
+            f"'osimlite validate {file}' checks the default pose"
+        )
 
 
 def _describe_run(trajectory: Trajectory, files: Sequence[Path], model: Model) -> FactTable:

@@ -8,6 +8,13 @@ from osimlite.schema.geometry import Appearance, SurfaceProperties
 from osimlite.schema.references import PhysicalFrameSocket
 from osimlite.schema.sets import ModelComponentSet
 
+START_DEPTH_M = 1e-3
+"""Depth of a sphere inside another surface at the start of a motion, m, above which it is reported."""
+
+# Small spheres at the floor start a few tenths of a millimetre deep by rounding.
+START_DEPTH_SHARE = 0.1
+"""The same depth as a share of the radius; both must be exceeded."""
+
 
 class ContactGeometry(ModelComponent, abstract=True):
     """Surface for contact forces, fixed in a physical frame."""

@@ -132,6 +132,8 @@ def test_measured_forces(fixtures: Path, tmp_path: Path) -> None:
         walker,
         "--to",
         "0.01",
+        "--set",
+        "Pelvis_ty=1",
         "-o",
         "out",
         "--external-loads",

@@ -166,7 +166,8 @@ def test_failure_says_one_sentence_and_leaves_nothing(walker, tmp_path, argument
 
 def test_failure_on_the_way_keeps_what_was_recorded(walker, tmp_path):
     code, out, err = run("simulate", walker, "--fixed-step", "0.1", "-o", "r", folder=tmp_path)
-    kept, said = err.splitlines()
+    kept, doubt, said = err.splitlines()
+    assert "OSIM521" in doubt
     assert (
         code == 1
         and "stopped at" in kept
@@ -193,6 +194,22 @@ def test_contacts_without_stiffness_are_named(walker, tmp_path):
     )
     done = run("simulate", walker, "--to", "0.1", "-o", "s", folder=tmp_path)
     assert done.code == 0 and "stiffness" not in done.out
+
+
+@pytest.mark.parametrize(
+    ("options", "depth"),
+    [((), "21.6 mm"), (("--set", "Pelvis_ty=0.9"), None), (("--set", "Pelvis_ty=1.7"), None)],
+)
+def test_a_contact_that_starts_inside_the_floor_is_named(walker, tmp_path, options, depth):
+    """The pose of the simulation counts, not the default pose that the rule checks."""
+    code, _, err = run(*("simulate", walker, "--to", "0.002", *options, "-o", "r"), folder=tmp_path)
+    assert code == 0
+    if depth is None:
+        assert err == ""
+    else:
+        (line,) = err.splitlines()
+        assert line.startswith("osimlite: warning: sphere 'RFootContact' starts " + depth)
+        assert "OSIM521" in line and f"'osimlite validate {walker}'" in line
 
 
 def test_unsupported_force(walker, tmp_path):

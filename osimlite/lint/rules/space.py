@@ -23,7 +23,7 @@ from osimlite.lint.skeleton import find_base
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import describe_object, format_quantity
 from osimlite.schema.base import Component, Object
-from osimlite.schema.contact import ContactGeometry
+from osimlite.schema.contact import START_DEPTH_M, START_DEPTH_SHARE, ContactGeometry
 from osimlite.schema.contact_types import ContactHalfSpace, ContactSphere
 from osimlite.schema.fields import Value
 from osimlite.schema.frames import Body, PhysicalOffsetFrame, StationDefinedFrame
@@ -168,13 +168,14 @@ def _describe_frame_cycle(subject: Subject, cycle: Sequence[PhysicalOffsetFrame]
 
 
 DEPTH = Threshold(
-    "contact-depth", 1e-3, "m", "largest accepted depth of a sphere inside a surface at the start"
+    "contact-depth",
+    START_DEPTH_M,
+    "m",
+    "largest accepted depth of a sphere inside a surface at the start",
 )
-# A relative limit as well, since small spheres at the floor start a few tenths of a millimetre deep
-# by rounding.
 RELATIVE_DEPTH = Threshold(
     "contact-depth-share",
-    0.1,
+    START_DEPTH_SHARE,
     "of the radius",
     "the same depth, as a share of the radius; a finding needs both depths to be exceeded",
 )
