@@ -11,7 +11,7 @@ import numpy as np
 
 from osimlite.base.quantity import Quantity, describe_unit_mistake, parse_quantity
 from osimlite.base.text import join_words
-from osimlite.errors import DocumentError, SettingError, SimulationError
+from osimlite.errors import DocumentError, SettingError
 from osimlite.io.tables.storage import StoTable, read_sto
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.schema.tree import is_a
@@ -160,8 +160,7 @@ def resolve_initial_values(
 
     Raises:
         ModelError: there is no such coordinate.
-        SettingError: a coordinate is set twice, or a number is not finite.
-        SimulationError: a coordinate is locked or prescribed.
+        SettingError: a coordinate is set twice, locked or prescribed, or a number is not finite.
     """
     infos = mechanism.coordinates
     q = [info.default_value for info in infos]
@@ -184,12 +183,12 @@ def resolve_initial_values(
                     f"coordinate '{name}' is set twice, by its name and by its path; leave one out"
                 )
             if infos[index].locked:
-                raise SimulationError(
+                raise SettingError(
                     f"coordinate '{name}' is locked at {infos[index].default_value:g}, so its {quantity} cannot "
                     "be set; unlock it in the model"
                 )
             if infos[index].prescribed is not None:
-                raise SimulationError(
+                raise SettingError(
                     f"coordinate '{name}' is prescribed, so its {quantity} cannot be set; "
                     "set its prescribed to false in the model"
                 )

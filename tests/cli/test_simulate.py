@@ -142,7 +142,8 @@ def test_fixed_step(walker, tmp_path):
         (["--set", "RHip_rz=fast"], 2, "a number such as 0.5 or 30deg"),
         (["--set", "Pelvis_tx=3deg"], 2, "m, cm or mm"),
         (["--set", "RHip_rz=3cm"], 2, "deg or rad"),
-        (["--set", "platform_rz=0"], 1, "is locked"),
+        (["--set", "platform_rz=0"], 2, "is locked"),
+        (["--set-speed", "platform_rz=0"], 2, "is locked"),
         (["--to", "-1"], 2, "must be positive"),
         (["--set-speed", "Pelvis_tx=3deg"], 2, "m/s, cm/s or mm/s"),
         (

@@ -15,7 +15,7 @@ import numpy as np
 from osimlite.base.records import dataclass, replace
 from osimlite.derivatives.sensitivity import integrate_sensitivities
 from osimlite.derivatives.tangents import TangentSteps
-from osimlite.errors import SettingError, SimulationError, UnsupportedError
+from osimlite.errors import SettingError
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.batches import Runs, run_many
 from osimlite.simulation.engines.protocol import EngineSettings
@@ -54,9 +54,9 @@ class _UnknownEvents(list[Any]):
         """Refuse access to the events of a run.
 
         Raises:
-            UnsupportedError: always, because events have no derivatives.
+            SettingError: always, because events have no derivatives.
         """
-        raise UnsupportedError(
+        raise SettingError(
             "events of a run have no derivatives; choose another measure, or another method"
         )
 
@@ -71,8 +71,7 @@ class Gradients:
 
     Raises:
         SettingError: the plan has another integrator than Merson's, a controller, or levels that
-            end runs.
-        UnsupportedError: the measure depends on events.
+            end runs, or the measure depends on events.
     """
 
     def __init__(self, plan: Plan) -> None:
@@ -94,7 +93,7 @@ class Gradients:
         base_variant = self._variants.base_variant
         self._measure = make_measure(plan.measures[0], base_variant.engine, plan.feet)
         if self._measure.watches:
-            raise UnsupportedError(
+            raise SettingError(
                 f"'{self._measure.name}' depends on events, which have no derivatives; "
                 "choose another measure, or another method"
             )
@@ -113,8 +112,8 @@ class Gradients:
             free_indices: indices of the variables (f,).
 
         Raises:
-            UnsupportedError: models with other values have other equations.
-            SimulationError: the measure has no derivative with respect to a variable.
+            SettingError: models with other values have other equations, or the measure has no
+                derivative with respect to a variable.
             OsimliteError: there is no run with these values.
         """
         center = self._make_neighbour(list(values))
@@ -134,8 +133,9 @@ class Gradients:
             neighbour.variant.structure != center.variant.structure
             for neighbour in neighbours_of_center
         ):
-            raise UnsupportedError(
-                "models with other values have other equations, and no derivatives between them"
+            raise SettingError(
+                "models with other values have other equations, and no derivatives between them; "
+                "choose other variables, or another method"
             )
 
         def differentiate(rows: Sequence[Array] | Array) -> Array:
@@ -194,7 +194,7 @@ class Gradients:
             variable_name = self._plan.variables[
                 free_indices[int(np.argmin(np.isfinite(result)))]
             ].name
-            raise SimulationError(
+            raise SettingError(
                 f"'{self._measure.name}' has no derivative with respect to '{variable_name}'; it may depend "
                 "on more than the states. Choose another measure, or another method"
             )

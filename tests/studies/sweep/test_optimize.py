@@ -295,6 +295,15 @@ def test_what_cannot_be_is_said(made, walker, tmp_path):
         optimize(plan(walker, {"RHip_rz": 0.3}), DISTANCE, tmp_path)
     with pytest.raises(SettingError, match="did you mean 'distance'"):
         optimize(made, Objective("distanc"), tmp_path)
+    # The method and the measure do not fit: the command is wrong, not the model.
+    with pytest.raises(SettingError, match="depends on events") as refusal:
+        optimize(
+            plan(walker, {"RHip_rz": (0.3, 0.5)}, to=0.01),
+            Objective("steps"),
+            tmp_path / "steps",
+            method="gradient",
+        )
+    assert refusal.value.exit_code == 2
 
 
 @pytest.mark.parametrize("name", [BEST_FILE, SUMMARY_FILE])
