@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 from osimlite.base.text import find_nearest, join_words
 from osimlite.io.document.lexical import format_shortest
@@ -52,18 +52,25 @@ def format_value(value: object) -> str:
     return str(value) if value not in (None, "") else "nothing"
 
 
-def find_nearest_name(text: str, valid_texts: list[str]) -> str | None:
+def find_nearest_name(
+    text: str, valid_texts: list[str], used_texts: Collection[str] = ()
+) -> str | None:
     """Return the nearest valid text; paths are compared by their last names. None if none is near.
 
     Args:
         text: text that is not valid.
         valid_texts: candidates, among which the nearest is searched.
+        used_texts: valid texts that are not suggested, because they are in use already. They are
+            no reason to suggest a name of the other side of the body.
     """
     from osimlite.base.sides import group_by_side
 
     for group in group_by_side(text, valid_texts):
-        if (nearest := _find_nearest_in_group(text, group)) is not None:
+        unused_texts = [word for word in group if word not in used_texts]
+        if (nearest := _find_nearest_in_group(text, unused_texts)) is not None:
             return nearest
+        if len(unused_texts) < len(group) and _find_nearest_in_group(text, group) is not None:
+            return None
     return None
 
 

@@ -26,3 +26,12 @@ def test_the_nearest_path_is_on_the_same_side(
     text: str, valid_texts: list[str], nearest: str | None
 ) -> None:
     assert find_nearest_name(text, valid_texts) == nearest
+
+
+def test_a_used_name_is_no_reason_to_suggest_the_other_side() -> None:
+    """The list has knee_angle_r, and another word that is similar to it."""
+    names = ["knee_angle_l", "knee_angle_r", "knee_angle_r_beta"]
+    assert find_nearest_name("knee_agle_r", names) == "knee_angle_r"
+    assert find_nearest_name("knee_agle_r", names, ["knee_angle_r"]) == "knee_angle_r_beta"
+    assert find_nearest_name("knee_agle_r", names, names[1:]) is None
+    assert find_nearest_name("knee_agle", names, names[:1]) == "knee_angle_r"

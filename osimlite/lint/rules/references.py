@@ -332,12 +332,10 @@ def _explain_reference(
     hint = "illegal" if resolution.failure == "illegal" else ""
     # A name that is already in the list is not suggested.
     current_values = getattr(use.holder, use.spec.name)
-    unused_texts = (
-        valid_texts
-        if isinstance(current_values, str)
-        else sorted(set(valid_texts).difference(current_values or ()))
-    )
-    return BrokenReference(use, text, "missing", None, find_nearest_name(text, unused_texts), hint)
+    used_texts = set() if isinstance(current_values, str) else set(current_values or ())
+    candidates = sorted(set(valid_texts)) if used_texts else valid_texts
+    suggestion = find_nearest_name(text, candidates, used_texts)
+    return BrokenReference(use, text, "missing", None, suggestion, hint)
 
 
 def _make_form_fault(use: Use, text: str, same_name: list[str]) -> BrokenReference:

@@ -211,7 +211,7 @@ def _look_up_controls(
     )
     controls = list(setup.find_by_class("Control"))
     # A free actuator is more likely to be meant than one that has a control.
-    free_actuators = sorted(actuators.difference(control.name for control in controls))
+    used_actuators = actuators.intersection(control.name for control in controls)
     for control in controls:
         if control.name not in actuators:
             report(
@@ -219,7 +219,7 @@ def _look_up_controls(
                 control,
                 attribute="name",
                 severity=severity,
-                suggestion=find_nearest_name(control.name, free_actuators),
+                suggestion=find_nearest_name(control.name, sorted(actuators), used_actuators),
             )
         elif not follows and getattr(control, "x_nodes", None) == []:
             report(
