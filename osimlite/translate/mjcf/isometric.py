@@ -42,10 +42,12 @@ def compute_isometric_tension(force: Any, lengths: Array, activations: Sequence[
     path = GeometryPath(name="path")
     for name, frame in (("a", "/ground"), ("b", "/bodyset/block")):
         path.path_point_set.objects.append(PathPoint(name=name, socket_parent_frame=frame))
-    model.add(force.copy_deep().model_copy(update={"name": "force", "geometry_path": path}))
+    # The name of the force remains, because messages contain it.
+    copy = force.copy_deep().model_copy(update={"geometry_path": path})
+    model.add(copy)
     if isinstance(force, Muscle):
         # The control equals the time, because it is the activation of muscles without such a state.
-        controller = PrescribedController(name="brain", socket_actuators=("/forceset/force",))
+        controller = PrescribedController(name="brain", socket_actuators=(copy,))
         controller.ControlFunctions.objects.append(LinearFunction(coefficients=(1.0, 0.0)))
         model.add(controller)
     mechanism = build_mechanism(model)

@@ -19,7 +19,7 @@ from osimlite.errors import OsimliteError
 from osimlite.mechanics.kernels.constrained_dynamics import SAFE_MASS
 from osimlite.mechanics.multibody.linear import solve_with_null_space, stack_equations
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.schema.forces import CoordinateLimitForce
+from osimlite.schema.forces import CoordinateLimitForce, Force
 from osimlite.schema.muscles import Muscle
 from osimlite.schema.path_forces import Blankevoort1991Ligament, Ligament, PathSpring
 from osimlite.schema.springs import BushingForce, PointToPointSpring, SpringGeneralizedForce
@@ -71,7 +71,7 @@ def choose_step(draft: MjcfDraft) -> None:
     for path, path_tendon in draft.tendons.items():
         muscle = draft.tree.by_path[path]
         tension = 0.0
-        if isinstance(muscle, Muscle):
+        if isinstance(muscle, Muscle) and _is_translated(draft, muscle):
             with suppress(OsimliteError):
                 (tension,) = compute_isometric_tension(
                     muscle, np.array((path_tendon.default,)), (0.0,)
@@ -85,6 +85,11 @@ def choose_step(draft: MjcfDraft) -> None:
                 )
                 detail = f"their passive force is {tension / muscle.max_isometric_force:.2g} times max_isometric_force"
                 draft.fidelity.add("overstretched", path, description, consequence, detail)
+
+
+def _is_translated(draft: MjcfDraft, force: Force) -> bool:
+    """Return whether a force is in the file."""
+    return draft.tree.path_of(force) in draft.fidelity.translated
 
 
 def _compute_fastest_rate(draft: MjcfDraft) -> float:
@@ -108,7 +113,12 @@ def _compute_fastest_rate(draft: MjcfDraft) -> float:
     if not len(mass) or np.linalg.eigvalsh(mass)[0] < SAFE_MASS:
         return 0.0
     builder = ElementBuilder(draft.model, mechanism, draft.folder or Path())
-    owners = [force for force in builder.iterate_forces() if isinstance(force, SPRING_TYPES)]
+    # A spring that is left out needs no small steps; often its stiffness cannot be computed.
+    owners = [
+        force
+        for force in builder.iterate_forces()
+        if isinstance(force, SPRING_TYPES) and _is_translated(draft, force)
+    ]
     springs = [builder.make_element(force) for force in owners]
     bushings = [
         spring

@@ -101,8 +101,26 @@ def test_a_muscle_that_has_no_tension_hinders_nobody():
     assert Compiled(mjcf).model.opt.timestep == 1e-4
 
 
-def test_springs_that_cannot_be_looked_at_are_told():
+def test_a_spring_that_is_left_out_hides_no_stiff_one():
     loose = spring(1.0)
-    loose.socket_body2 = "/bodyset/nobody"
-    (record,) = (record for record in to_mjcf(sled(loose)).fidelity if record.kind == "stiff")
-    assert "nobody" in record.detail
+    loose.name, loose.socket_body2 = "loose", "/bodyset/nobody"
+    mjcf = to_mjcf(sled(loose, spring(2.0 * 8000.0**2)))
+    assert Compiled(mjcf).model.opt.timestep == 1e-4
+    (record,) = (record for record in mjcf.fidelity if record.kind == "stiff")
+    assert record.done == "the file sets smaller steps"
+
+
+def test_a_muscle_that_is_left_out_has_one_record():
+    pushing = muscle(0.03)
+    pushing.max_isometric_force = -100.0
+    records = [
+        record for record in to_mjcf(sled(pushing)).fidelity if record.component == "/forceset/f"
+    ]
+    assert [record.kind for record in records] == ["force"]
+
+
+def test_messages_about_a_tension_name_the_muscle():
+    impossible = muscle(0.08)
+    impossible.name, impossible.minimum_activation = "impossible", -1.0
+    (record,) = (record for record in to_mjcf(sled(impossible)).fidelity if record.kind == "force")
+    assert "'/forceset/impossible'" in record.done
