@@ -74,8 +74,13 @@ def add_contacts(draft: MjcfDraft) -> None:
             draft.fidelity.add("contact", path, description, f"{LEFT_OUT}: {error}")
             continue
         if not pair_names:
-            done = f"{LEFT_OUT}: no two of its surfaces on different bodies are in the file"
-            draft.fidelity.add("contact", path, description, done)
+            is_stiff = all(stiffness > 0.0 for *_, stiffness in _iterate_surfaces(draft, force))
+            reason = (
+                "no two of its surfaces on different bodies are in the file"
+                if is_stiff
+                else "a stiffness of its surfaces is not positive"
+            )
+            draft.fidelity.add("contact", path, description, f"{LEFT_OUT}: {reason}")
             continue
         replacement = "MuJoCo's contact law: it supports the bodies, but forces and motions differ"
         draft.fidelity.add("contact", path, description, replacement, f"pairs {pair_names}")
@@ -157,14 +162,19 @@ def _require_thickness(corners: Array) -> None:
 
 
 def _add_pairs(draft: MjcfDraft, force: ContactForce) -> Iterator[str]:
-    """Add a pair for any two surfaces of a force that are on different bodies.
+    """Add a pair for any two surfaces of a force that are stiff and on different bodies.
 
     Yields:
         Name of each pair.
     """
-    for (first_surface, first_friction), (second_surface, second_friction) in combinations(
-        _iterate_surfaces(draft, force), 2
-    ):
+    # Surfaces in series: one that is infinitely soft takes the force from both. In an elastic
+    # foundation each mesh has springs of its own.
+    find_stiffness = max if isinstance(force, ElasticFoundationForce) else min
+    for (first_surface, first_friction, first_stiffness), (
+        second_surface,
+        second_friction,
+        second_stiffness,
+    ) in combinations(_iterate_surfaces(draft, force), 2):
         geom_records = [
             draft.fidelity.translated.get(draft.tree.path_of(surface) or "")
             for surface in (first_surface, second_surface)
@@ -178,6 +188,9 @@ def _add_pairs(draft: MjcfDraft, force: ContactForce) -> Iterator[str]:
         )
         # Two half spaces have no defined contact, and a body does not touch itself.
         if are_half_spaces or bodies[0] == bodies[1] or None in geom_records:
+            continue
+        # MuJoCo's contact has a stiffness of its own, and would support the bodies.
+        if not find_stiffness(first_stiffness, second_stiffness) > 0.0:
             continue
         geoms = [str(geom_record).removeprefix("geom ") for geom_record in geom_records]
         name = draft.make_name("pair", ".".join(geoms))
@@ -202,8 +215,8 @@ def _add_pairs(draft: MjcfDraft, force: ContactForce) -> Iterator[str]:
 
 def _iterate_surfaces(
     draft: MjcfDraft, force: ContactForce
-) -> Iterator[tuple[ContactGeometry, float]]:
-    """Yield the surfaces of a force with the dynamic friction coefficient of each.
+) -> Iterator[tuple[ContactGeometry, float, float]]:
+    """Yield the surfaces of a force with the dynamic friction coefficient and the stiffness of each.
 
     Raises:
         ModelError: the force names a contact geometry that the model does not have.
@@ -212,7 +225,7 @@ def _iterate_surfaces(
         for socket in ("socket_sphere", "socket_half_space"):
             surface = draft.tree.target(force, socket, getattr(force, socket))
             if isinstance(surface, ContactGeometry):
-                yield surface, force.dynamic_friction
+                yield surface, force.dynamic_friction, force.stiffness
         return
     for parameters in force.contact_parameters.objects:
         spec = type(parameters).field_specs()["geometry"]
@@ -224,4 +237,4 @@ def _iterate_surfaces(
                 raise ModelError(
                     f"it names the contact geometry '{geometry_name}', which the model does not have"
                 )
-            yield result, parameters.dynamic_friction
+            yield result, parameters.dynamic_friction, parameters.stiffness

@@ -172,6 +172,17 @@ def test_without_contact_it_falls_through_and_that_is_told():
     }
 
 
+@pytest.mark.parametrize("stiffness", [0.0, -1.0])
+def test_a_contact_without_stiffness_supports_nothing(stiffness):
+    model = falling()
+    (law,) = model.force_set.objects
+    law.contact_parameters.objects[0].stiffness = stiffness
+    mjcf = to_mjcf(model)
+    assert "<pair" not in mjcf.text
+    (record,) = (record for record in mjcf.fidelity if record.kind == "contact")
+    assert record.done == "left out: a stiffness of its surfaces is not positive"
+
+
 def test_a_mesh_touches_by_its_convex_hull(tmp_path):
     (tmp_path / "wedge.obj").write_text(
         "v 0 0 0\nv .2 0 0\nv 0 .2 0\nv 0 0 .2\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"

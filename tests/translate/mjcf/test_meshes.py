@@ -87,7 +87,7 @@ def test_a_contact_mesh_is_left_out_if_mujoco_rejects_it(file: str, tmp_path: Pa
     model.add(ContactMesh(name="mesh", socket_frame="/bodyset/bob", filename=file))
     model.add(ContactHalfSpace(name="floor", socket_frame="/ground"))
     force = ElasticFoundationForce(name="force")
-    parameters = ElasticFoundationContactParameters(geometry=["mesh", "floor"])
+    parameters = ElasticFoundationContactParameters(geometry=["mesh", "floor"], stiffness=1e6)
     force.contact_parameters.objects.append(parameters)
     model.add(force)
     records = export_records(model, tmp_path)
