@@ -77,3 +77,13 @@ def add_coordinates(draft: MjcfDraft) -> None:
                 "three hinges with the same coordinates; their speeds are the rates of the coordinates; "
                 "singular in the same poses as in OpenSim",
             )
+    for body in draft.mechanism.bodies:
+        # The joint that OpenSim adds for a loose body is not a component of the model.
+        if body.path in draft.tree.by_path and body.mobilizer.joint not in draft.tree.by_path:
+            note(
+                "loose-body",
+                body.path,
+                "a body without a joint",
+                "free to move relative to ground, as in OpenSim; the speeds of its three hinges are the rates of the "
+                "angles, and not the components of the angular velocity",
+            )

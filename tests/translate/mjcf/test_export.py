@@ -56,6 +56,14 @@ def test_both_versions_of_mujoco_have_the_same_bodies(older, corpus, tmp_path):
 
 
 # ------------------------------------------------------------------------------------------------ records of losses
+def test_a_body_without_a_joint_has_a_record():
+    model = Model(name="loose")
+    model.add(Body(name="ball", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
+    (record,) = to_mjcf(model).fidelity
+    assert (record.kind, record.component) == ("loose-body", "/bodyset/ball")
+    assert "rates of the angles" in record.done
+
+
 def test_every_component_of_the_walker_is_accounted_for():
     model = dynamic_walker()
     mjcf = to_mjcf(model)
