@@ -28,6 +28,7 @@ from osimlite.simulation.paths import Paths
 from osimlite.simulation.robot.build import build_robot
 from osimlite.simulation.robot.names import UniqueNames, legal, legal_names
 from osimlite.simulation.robot.robot import Robot, RobotJoint
+from osimlite.translate.biomod_survey import has_limits, record_biomod_losses
 from osimlite.translate.fidelity import LEFT_OUT, Error, Fidelity
 from osimlite.translate.files import write_files
 from osimlite.translate.mjcf.poses import draw_poses, measure_arm_errors
@@ -109,8 +110,6 @@ def to_biomod(
     # biorbd's names have no slashes or blanks.
     robot = legal_names(build_robot(mechanism))
     fidelity = Fidelity(mechanism.name, "biomod")
-    for body in mechanism.bodies:
-        fidelity.translated[body.path] = f"segment {robot.link_of[body.path][0].name}"
     # Each joint of the robot becomes a degree of freedom.
     for joint in robot.moving:
         if joint.coordinate is None:
@@ -135,6 +134,7 @@ def to_biomod(
     for force in model.components(Force):
         if not isinstance(force, Muscle):
             fidelity.add("force", force.path, "forces other than muscles", LEFT_OUT)
+    record_biomod_losses(model, robot, fidelity)
     file_stem = legal(model.name or "model") if name is None else name
     coordinates = format_coordinates(robot, f"{file_stem}.bioMod")
     return BioMod(file_stem, "\n".join(lines) + "\n", coordinates, fidelity, robot)
@@ -203,9 +203,10 @@ def _format_segment(
     if joint is not None:
         yield f"\t{'rotations' if joint.kind == 'revolute' else 'translations'} {axis_letter}"
         if joint.coordinate is not None:
-            lower, upper = robot.mechanism.coordinates[joint.coordinate].range
-            yield "\trangesQ"
-            yield f"\t\t{_format_numbers((lower, upper))}"
+            limits = robot.mechanism.coordinates[joint.coordinate].range
+            if has_limits(limits):
+                yield "\trangesQ"
+                yield f"\t\t{_format_numbers(limits)}"
 
 
 def _find_axis(joint: RobotJoint) -> str | None:
@@ -249,6 +250,7 @@ def _format_markers(
         name = names(marker.name)
         segment, point = _locate_in_segment(marker, robot, placements)
         fidelity.translated[marker.path] = f"marker {name}"
+        fidelity.note_name(marker.path, "marker", marker.name, name)
         yield from (f"marker {name}", f"\tparent {segment}", f"\tposition {_format_numbers(point)}")
         yield from ("\ttechnical 1", "endmarker", "")
 
@@ -312,6 +314,10 @@ def _format_muscles(
     errors = _measure_path_errors(model, placements)
     for muscle in model.components(Muscle):
         path = muscle.geometry_path
+        if not muscle.appliesForce:
+            fidelity.add("muscle", muscle.path, "a muscle whose appliesForce is false", LEFT_OUT)
+            # biorbd has no property that turns a muscle off.
+            continue
         if not isinstance(path, GeometryPath):
             fidelity.add(
                 "muscle", muscle.path, "a path that is a function of coordinates", LEFT_OUT
@@ -364,6 +370,8 @@ def _format_muscles(
                 ", ".join(f"{attribute} {value:g} s" for attribute, value in constants.items()),
             )
         name = names(muscle.name)
+        fidelity.translated[muscle.path] = f"muscle {name}"
+        fidelity.note_name(muscle.path, "muscle", muscle.name, name)
         # The first and the last point are attributes of the group, the others are via points.
         positions = [_locate_in_segment(point, robot, placements) for point in points]
         (first, origin), *via_points, (last, insertion) = positions

@@ -60,12 +60,16 @@ def record_dropped_components(tree: Tree, fidelity: Fidelity) -> None:
         fidelity: account of the translation; records are added.
     """
     accounted = {record.component for record in fidelity.records} | fidelity.translated.keys()
+    dropped_paths = {
+        record.component for record in fidelity.records if record.how == "dropped"
+    } - fidelity.translated.keys()
     dropped: set[int] = set()
     for component in tree.components:
         path = tree.path_of(component) or ""
         parent = tree.parent_of(component)
-        if parent is not None and id(parent) in dropped:
-            # A part of something left out, such as the path of a muscle.
+        is_part = parent is not None and id(parent) in dropped
+        if is_part or path in dropped_paths:
+            # Parts of something left out, such as the path of a muscle, are left out with it.
             dropped.add(id(component))
         elif path not in accounted and not isinstance(component, CONTAINERS):
             dropped.add(id(component))

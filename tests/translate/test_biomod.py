@@ -6,6 +6,7 @@ tests/oracle/test_biorbd.py compares with biorbd itself.
 from __future__ import annotations
 
 import json
+import math
 import re
 from pathlib import Path
 
@@ -16,7 +17,9 @@ import osimlite
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.models.jumper import jumper
 from osimlite.translate.biomod import BioMod, to_biomod
+from osimlite.translate.survey import CONTAINERS
 from tests.cli.command import run
+from tests.simple_models import make_single_body
 from tests.translate.support import make_tilted
 
 
@@ -112,6 +115,54 @@ def test_other_time_constants_are_recorded() -> None:
     assert record.detail == "deactivation_time_constant 0.05 s"
     muscle.deactivation_time_constant = 0.04
     assert "activation" not in {record.kind for record in to_biomod(model).fidelity}
+
+
+# ------------------------------------------------------------------------------------------------ records of losses
+@pytest.mark.parametrize("make", [make_tilted, dynamic_walker, jumper])
+def test_every_component_is_accounted_for(make) -> None:
+    model = make()
+    made = to_biomod(model)
+    paths = [part.path for part in model.components() if not isinstance(part, CONTAINERS)]
+    assert made.fidelity.list_missing(paths) == []
+
+
+@pytest.mark.parametrize(
+    ("properties", "kind"),
+    [
+        ({"default_value": 0.4}, "default-pose"),
+        ({"default_speed_value": 2.0}, "default-speed"),
+        ({"prescribed": True, "prescribed_function": osimlite.Constant(value=0.7)}, "prescribed"),
+        ({"range": (-math.inf, math.inf)}, "coordinate-range"),
+        ({"range": (1.0, -1.0)}, "coordinate-range"),
+    ],
+)
+def test_what_a_degree_of_freedom_lacks_is_recorded(properties, kind) -> None:
+    coordinate = osimlite.Coordinate(name="q", **properties)
+    made = to_biomod(make_single_body(osimlite.PinJoint(name="pin", coordinates=[coordinate])))
+    (record,) = made.fidelity
+    assert (record.kind, record.component) == (kind, "/jointset/pin/q")
+    assert ("rangesQ" in made.text) == (kind != "coordinate-range")
+
+
+def test_joints_with_other_speeds_are_recorded() -> None:
+    (record,) = to_biomod(make_single_body(osimlite.FreeJoint(name="free"))).fidelity
+    assert (record.kind, record.component) == ("speeds", "/jointset/free")
+    model = osimlite.Model(name="loose")
+    model.add(osimlite.Body(name="ball", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
+    (record,) = to_biomod(model).fidelity
+    assert (record.kind, record.component) == ("loose-body", "/bodyset/ball")
+
+
+def test_a_muscle_that_is_off_is_left_out_with_its_parts() -> None:
+    model = make_tilted()
+    (muscle,) = model.components(osimlite.Muscle)
+    muscle.appliesForce = False
+    made = to_biomod(model)
+    assert "wagger" not in made.text
+    (record,) = (
+        record for record in made.fidelity if record.component.startswith("/forceset/wagger")
+    )
+    assert (record.component, record.how) == ("/forceset/wagger", "dropped")
 
 
 READ_ATTRIBUTES = {
