@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
+from math import isnan
 from pathlib import Path
 from typing import Any
 
@@ -67,14 +68,20 @@ class TrialReport(Report):
         return list(result.values())
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the report with values that JSON has.
+        """Return the report with values that JSON has; a value that does not exist is None.
 
         Returns:
             Findings, verdicts and unchecked parts, by these names.
         """
         return {
             "findings": [finding.as_dict() for finding in self.findings],
-            "verdicts": [verdict._asdict() for verdict in self.verdicts],
+            "verdicts": [
+                {
+                    key: None if isinstance(value, float) and isnan(value) else value
+                    for key, value in verdict._asdict().items()
+                }
+                for verdict in self.verdicts
+            ],
             "unchecked": self.unchecked,
         }
 

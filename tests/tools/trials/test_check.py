@@ -257,6 +257,10 @@ def test_a_missing_value_is_a_dash(tmp_path: Path) -> None:
     verdict = next(row for row in report.verdicts if "the peak of FX " in row.of)
     assert np.isnan(verdict.value) and verdict.verdict == "bad"
     assert verdict.value_text == "-" and "nan" not in verdict.limits
+    # JSON has no NaN.
+    (value,) = [row["value"] for row in report.as_dict()["verdicts"] if row["of"] == verdict.of]
+    assert value is None
+    json.dumps(report.as_dict(), allow_nan=False)
 
 
 def test_a_folder_without_anything_of_a_trial_is_an_error(tmp_path: Path) -> None:
