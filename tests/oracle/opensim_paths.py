@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +25,8 @@ def compare_paths(file: Path, poses: int, seed: int = 0) -> None:
     Paths whose length is discontinuous at a pose, here or in OpenSim, are skipped, because rounding
     decides the result there. Where a path amplifies rounding, the tolerance is the change of length
     between poses that are hardly apart. Where OpenSim's length is NaN, osimlite must have no length
-    either.
+    either. Where points of two bodies coincide, OpenSim's moment arms are NaN, and osimlite's must
+    be numbers.
     """
     opensim.Logger.setLevelString("off")
     theirs = opensim.Model(str(file))
@@ -71,6 +73,9 @@ def compare_paths(file: Path, poses: int, seed: int = 0) -> None:
             assert abs(speeds[name] - path.getLengtheningSpeed(state)) < 1e-10, name
             expected = [path.computeMomentArm(state, coordinate) for coordinate in coordinates]
             result = [arms[name].get(info.path, 0.0) for info in infos]
+            if np.isnan(expected).any() and _coincide(path, state):
+                assert np.isfinite(result).all(), name
+                continue
             assert np.allclose(result, expected, rtol=coupled, atol=1e-10, equal_nan=True), name
 
 
@@ -86,6 +91,26 @@ def _lengths(path, theirs, coordinates, state, poses, u) -> np.ndarray:
         theirs.realizePosition(state)
         result.append(path.getLength(state))
     return np.array(result)
+
+
+def _coincide(path, state) -> bool:
+    """Return whether two consecutive points of a path in OpenSim are on two bodies and coincide exactly."""
+    geometry = opensim.GeometryPath.safeDownCast(path)
+    if geometry is None:
+        return False  # a FunctionBasedPath has no points
+    points = geometry.getCurrentPath(state)
+    # OpenSim sets the direction between points of one body to 0, and between bodies to NaN.
+    items = [
+        (
+            point.getParentFrame().findBaseFrame().getAbsolutePathString(),
+            point.getLocationInGround(state).to_numpy(),
+        )
+        for point in map(points.get, range(points.getSize()))
+    ]
+    return any(
+        first[0] != second[0] and np.array_equal(first[1], second[1])
+        for first, second in pairwise(items)
+    )
 
 
 def _path(theirs, model, owner):

@@ -266,6 +266,37 @@ def test_two_points_at_one_place_beside_a_torus(quadrant, tmp_path):
     compare_paths(tmp_path / "model.osim", poses=1)
 
 
+def test_points_of_two_bodies_at_one_place(tmp_path):
+    """OpenSim's moment arms are NaN; here they are those of the path without one of the points."""
+    model, body = Model(name="centre"), None
+    for number in range(2):
+        below, body = (
+            body or model.ground,
+            model.add(Body(name=f"b{number}", mass=1.0, inertia=(1, 1, 1, 0, 0, 0))),
+        )
+        coordinate = Coordinate(name=f"q{number}", range=(-1.2, 1.2))
+        joint = osimlite.PinJoint(name=f"j{number}", coordinates=[coordinate])
+        model.add(joint.between(below, body, at=(0, 0.1, 0), turned=(0.2, 0, 0)))
+    first, last = at(GROUND, 0.3, 0.1, 0.0), at(B1, 0.2, -0.1, 0.0)
+    # The joint's centre, where ground and b0 meet in every pose.
+    on_ground, on_b0 = at(GROUND, 0.0, 0.1, 0.0), at(B0, 0.0, 0.0, 0.0)
+    routes = {"both": (first, on_ground, on_b0, last), "one": (first, on_b0, last)}
+    for name, points in routes.items():
+        spring = PathSpring(name=name, resting_length=0.2, stiffness=300.0, dissipation=0.4)
+        for index, point in enumerate(points):
+            spring.geometry_path.path_point_set.objects.append(
+                point.model_copy(update={"name": f"p{index}"})
+            )
+        model.add(spring)
+    osimlite.write(model, tmp_path / "model.osim")
+    compare_paths(tmp_path / "model.osim", poses=3)
+    paths = osimlite.paths(model)
+    for pose in ({"q0": 0.4, "q1": -0.3}, {"q0": -1.0, "q1": 0.8}):
+        arms = paths.moment_arms(paths.mechanism.values(pose))
+        assert arms["/forceset/both"] == pytest.approx(arms["/forceset/one"], abs=1e-14)
+        assert abs(arms["/forceset/both"]["/jointset/j1/q1"]) > 0.01
+
+
 @pytest.mark.parametrize("quadrant", ["all", "-x", "y", "-y"])
 @pytest.mark.parametrize(
     "heights", [(0.11, 0.0), (0.02, 0.0), (0.02, 1e-16), (0.02, 1e-15), (0.0, 0.02), (0.0, 0.0)]
