@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import Phase, given, settings
+from hypothesis import Phase, example, given, settings
 from hypothesis import strategies as st
 
 import osimlite
@@ -122,7 +122,9 @@ def with_states(seed):
         return random.model, {path: random.number(0.0, 2.0) for path in simulation.state.paths}
 
 
-@settings(max_examples=10, deadline=None, derandomize=True, phases=[Phase.generate])
+@settings(max_examples=10, deadline=None, derandomize=True, phases=[Phase.explicit, Phase.generate])
+@example(seed=448690)
+@example(seed=835180)
 @given(seed=st.integers(0, 10**6))
 def test_random_models_keep_their_states(seed, tmp_path_factory):
     """Run both engines with both kinds of steps, as a batch, and from a file."""
@@ -134,7 +136,7 @@ def test_random_models_keep_their_states(seed, tmp_path_factory):
     for engine in ("bullet", "compiled"):
         with Simulation(model, engine) as simulation:
             assert set(z) == set(simulation.state.paths) and set(z) < set(simulation.paths)
-            for step in ({"accuracy": 1e-8}, {"fixed_step": 1e-3}):
+            for step in ({"accuracy": 1e-8}, {"fixed_step": 2e-4}):
                 trajectory = simulation.run(0.02, initial=z, **step)
                 assert {path: rows[0] for path, rows in trajectory.auxiliary.items()} == z
                 ends[engine, *step] = [rows[-1] for rows in trajectory.auxiliary.values()]
@@ -176,8 +178,9 @@ def test_random_models_keep_their_states(seed, tmp_path_factory):
     assert ends["bullet", "accuracy"] == pytest.approx(
         ends["compiled", "accuracy"], rel=1e-7, abs=1e-9
     )
-    # Bullet integrates the rates of its joints, and some of these differ from the generalized
-    # speeds.
+    # Both engines take fixed steps of first order. Of 664 random models, 1 dissipates so much in 20
+    # ms that steps of 1 ms err by 0.15 J, and five times shorter ones by 0.02 J. Bullet integrates
+    # the rates of its joints, and some of these differ from the generalized speeds.
     for engine in ("bullet", "compiled"):
         assert ends[engine, "fixed_step"] == pytest.approx(
             ends["compiled", "accuracy"], rel=0.1, abs=0.1
