@@ -135,7 +135,7 @@ def simulate(
                 f"{ending} at {trajectory.times[-1]:.6g} s of {to:g} s; the motion up to there is saved in '{results}'"
             )
             if earlier is None:
-                _warn_of_deep_contacts(simulation, trajectory, file)
+                _warn_of_sunk_contacts(simulation, trajectory, file)
             _describe_run(trajectory, write_results(trajectory, results), model).show()
             if is_failure:
                 raise
@@ -159,7 +159,7 @@ def simulate(
                 )
 
         if earlier is None:
-            _warn_of_deep_contacts(simulation, trajectory, file)
+            _warn_of_sunk_contacts(simulation, trajectory, file)
         files = write_results(trajectory, results, plot=plot, film=film if animate else None)
         _describe_run(trajectory, files, model).show()
         # The window stays open until the user closes it.
@@ -282,8 +282,10 @@ def _find_soft_contacts(model: Model) -> list[str]:
     ]
 
 
-def _warn_of_deep_contacts(simulation: Simulation, trajectory: Trajectory, file: Path) -> None:
-    """Warn on standard error of contact surfaces that start inside each other, as OSIM521 does.
+def _warn_of_sunk_contacts(simulation: Simulation, trajectory: Trajectory, file: Path) -> None:
+    """Warn on standard error of contacts whose centres start inside the floor, as OSIM521 does.
+
+    Walkers often start a little inside the floor, which is no reason for a warning.
 
     Args:
         simulation: simulation with the forces of the model.
@@ -293,9 +295,10 @@ def _warn_of_deep_contacts(simulation: Simulation, trajectory: Trajectory, file:
     from osimlite.simulation.initial_contacts import find_deep_contacts
 
     # The rule is about the default pose, and --set or --states may have moved the model.
-    contacts = find_deep_contacts(
+    deep_contacts = find_deep_contacts(
         simulation.forces, trajectory.mechanism, trajectory.values[0], float(trajectory.times[0])
     )
+    contacts = [contact for contact in deep_contacts if contact.is_sunk]
     if contacts:
         deepest = contacts[0]
         others = f", and {len(contacts) - 1} more like this" if len(contacts) > 1 else ""

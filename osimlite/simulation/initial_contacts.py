@@ -23,11 +23,13 @@ class DeepContact(NamedTuple):
         sphere: name of the sphere.
         surface: name of the half space or sphere that it is inside.
         depth: depth, m.
+        is_sunk: whether even its centre is inside a half space, which the rule OSIM521 warns of.
     """
 
     sphere: str
     surface: str
     depth: float
+    is_sunk: bool
 
 
 def find_deep_contacts(
@@ -66,7 +68,8 @@ def find_deep_contacts(
         depth = _compute_depth(state, sphere, surface)
         # Between two half spaces the depth is infinite. A NaN is not larger.
         if inf > depth > max(START_DEPTH_M, START_DEPTH_SHARE * sphere.radius):
-            contacts.append(DeepContact(sphere.name, surface.name, depth))
+            is_sunk = surface.radius == inf and depth > sphere.radius
+            contacts.append(DeepContact(sphere.name, surface.name, depth, is_sunk))
     return sorted(contacts, key=lambda contact: -contact.depth)
 
 

@@ -199,9 +199,9 @@ def test_contacts_without_stiffness_are_named(walker, tmp_path):
 
 @pytest.mark.parametrize(
     ("options", "depth"),
-    [((), "21.6 mm"), (("--set", "Pelvis_ty=0.9"), None), (("--set", "Pelvis_ty=1.7"), None)],
+    [((), None), (("--set", "Pelvis_ty=0.8"), "56.6 mm"), (("--set", "Pelvis_ty=1.7"), None)],
 )
-def test_a_contact_that_starts_inside_the_floor_is_named(walker, tmp_path, options, depth):
+def test_a_contact_whose_centre_starts_inside_the_floor_is_named(walker, tmp_path, options, depth):
     """The pose of the simulation counts, not the default pose that the rule checks."""
     code, _, err = run(*("simulate", walker, "--to", "0.002", *options, "-o", "r"), folder=tmp_path)
     assert code == 0

@@ -8,6 +8,7 @@ import pytest
 
 import osimlite
 from osimlite.lint import validate
+from osimlite.lint.diagnostic import Severity
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.initial_contacts import DeepContact, find_deep_contacts
 from tests.simple_models import make_single_body
@@ -28,6 +29,7 @@ def test_depths_are_those_of_the_rule(fixtures: Path, name: str) -> None:
     for contact, finding in zip(contacts, findings, strict=True):
         assert f"'{contact.sphere}' starts {1000 * contact.depth:.3g} mm inside" in finding.message
         assert f"'{contact.surface}'" in finding.message
+        assert contact.is_sunk == (finding.severity == Severity.WARNING)
 
 
 def test_a_smooth_contact_and_two_spheres() -> None:
