@@ -341,13 +341,16 @@ class _Survey:
             # Several joints of one coordinate may mimic different leaders; then none is named.
             leader = leaders.pop() if len(leaders) == 1 else None
             name = self.robot.mechanism.coordinates[coupler.dependent].name
+            done = f"a separate joint: {COMPUTE_ADVICE}"
+            if leader is not None:
+                done = "a joint that mimics another"
+            elif not driven_joints:
+                done = "a fixed joint: your program must hold the coordinates of which it is a function"
             self.note(
                 "coupler",
                 coupler.name,
                 "a coordinate that is a function of others",
-                f"a separate joint: {COMPUTE_ADVICE}"
-                if leader is None
-                else "a joint that mimics another",
+                done,
                 f"coordinate {name}" + ("" if leader is None else f" follows joint {leader}"),
             )
 

@@ -71,6 +71,22 @@ def test_numbers_and_names_are_in_the_details():
     )
 
 
+def test_a_coupler_of_a_locked_coordinate_is_told():
+    model = dynamic_walker()
+    hip, knee = "/jointset/RightThighToPelvis/RHip_rz", "/jointset/RightShankToThigh/RKnee_rz"
+    model[knee].locked = True
+    model.add(
+        osimlite.CoordinateCouplerConstraint(
+            name="coupler",
+            coupled_coordinates_function=osimlite.LinearFunction(coefficients=(2.0, 0.0)),
+            independent_coordinate_names=(hip.rpartition("/")[2],),
+            dependent_coordinate_name=knee.rpartition("/")[2],
+        )
+    )
+    (record,) = (record for record in to_urdf(model).fidelity if record.kind == "coupler")
+    assert record.done.startswith("a fixed joint: your program must hold")
+
+
 def test_what_the_joints_cannot_say_is_told():
     ball = one_body(joint=BallJoint(name="ball", coordinates=[Coordinate(name=n) for n in "abc"]))
     assert kinds(to_urdf(ball))["ball-joint"] == ["/jointset/ball"]

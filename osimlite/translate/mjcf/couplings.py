@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.polynomial import Polynomial
 
+from osimlite.mechanics.multibody.constraints import Coupler
 from osimlite.mechanics.multibody.functions import IDENTITY, Linear
 from osimlite.mechanics.multibody.mechanism import GROUND
 from osimlite.mechanics.multibody.spatial import Array
@@ -21,7 +23,7 @@ from osimlite.simulation.robot.couplings import (
 )
 from osimlite.simulation.robot.names import joint_names
 from osimlite.simulation.robot.robot import RobotJoint
-from osimlite.translate.fidelity import Error
+from osimlite.translate.fidelity import LEFT_OUT, Error
 from osimlite.translate.mjcf.bodies import MIN_MASS
 from osimlite.translate.mjcf.draft import SPECK_MASS_KG, Follower, Lead, MjcfDraft, add_element
 from osimlite.translate.mjcf.ellipsoids import add_ellipsoids
@@ -80,10 +82,14 @@ def add_couplings(draft: MjcfDraft) -> None:
             )
             _add_follower(draft, joint, driver, coupler_path or joint.source)
     for index, path in coupler_by_coordinate.items():
-        names = " ".join(joint.name for joint in robot.moving if index in joint.coordinates)
-        draft.fidelity.translated[path] = (
-            f"equality {names}" if names else "nothing: the coordinates that it couples are locked"
-        )
+        if not draft.mechanism.coordinates[index].locked:
+            names = " ".join(joint.name for joint in robot.moving if index in joint.coordinates)
+            draft.fidelity.translated[path] = (
+                f"equality {names}" if names else "nothing: the coordinate moves no body"
+            )
+    for coupler in list_couplers(robot):
+        if draft.mechanism.coordinates[coupler.dependent].locked:
+            _hold_arguments(draft, coupler, drivers)
     for coupler in list_couplers(robot):
         if coupler.dependent not in drivers:
             description = "a coordinate that is a function of several others, or of itself"
@@ -249,6 +255,43 @@ def compose_with_line(line: StraightLine, polynomial: Array) -> tuple[float, ...
     """
     composed: Any = Polynomial(polynomial)(Polynomial((line.offset, line.slope)))
     return tuple(composed.coef.tolist())
+
+
+def _hold_arguments(
+    draft: MjcfDraft, coupler: Coupler, drivers: Mapping[int, CouplingDriver]
+) -> None:
+    """Hold the coordinate on which a locked coordinate depends, where it gives the locked value.
+
+    Args:
+        draft: MJCF under construction.
+        coupler: coupler whose dependent coordinate is locked.
+        drivers: drivers of the coordinates that do not move freely.
+    """
+    free_indices = {
+        driving_index
+        for index in coupler.independent
+        if (driving_index := drivers.get(index, CouplingDriver(index, IDENTITY)).coordinate)
+        is not None
+    }
+    arguments = draft.default_state[0][list(coupler.independent)]
+    _, gradient, hessian = coupler.function.evaluate(arguments)
+    # A constant function is fulfilled by any motion.
+    if not free_indices or not (np.any(gradient) or np.any(hessian)):
+        draft.fidelity.translated[coupler.name] = "nothing: it holds no coordinate that can move"
+        return
+    if len(free_indices) > 1:
+        description = "a locked coordinate that is a function of several others"
+        done = f"{LEFT_OUT}: the other coordinates are free"
+        draft.fidelity.add("coupler", coupler.name, description, done)
+        return
+    (index,) = free_indices
+    leader = draft.leads.get(index) or _add_argument_joint(draft, index)
+    draft.fidelity.translated[coupler.name] = f"equality {leader.joint}"
+    # Several locked coordinates may depend on one that is free.
+    if leader.joint not in draft.followers:
+        value = float(draft.default_state[0][index])
+        held_value = leader.line.slope * value + leader.line.offset
+        draft.add_follower(leader.joint, Follower(None, (held_value,)))
 
 
 def _hold_joint(draft: MjcfDraft, joint: RobotJoint) -> None:

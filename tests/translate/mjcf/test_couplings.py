@@ -131,6 +131,30 @@ def test_a_function_of_a_locked_coordinate_is_a_number():
     assert leader is None and polynomial[0] == pytest.approx(0.35**2, abs=1e-15)
 
 
+def test_a_lock_holds_the_coordinate_that_a_coupler_follows():
+    model = coupled(LinearFunction(coefficients=(0.5, 0.2)))
+    beta = model["/jointset/k/beta"]
+    beta.locked, beta.default_value = True, 0.6
+    mjcf = to_mjcf(model)
+    held = equalities(Compiled(mjcf))
+    # The body rotates by the coordinate, and slides by a tenth of it.
+    (leader,) = {name for name, (_, polynomial) in held.items() if not polynomial[1:].any()}
+    assert held[leader][0] is None and held[leader][1][0] == pytest.approx(0.8, abs=1e-9)
+    assert list(mjcf.fidelity) == []
+    assert mjcf.fidelity.translated["/constraintset/c"] == f"equality {leader}"
+
+
+@pytest.mark.parametrize("is_locked", [False, True])
+def test_a_lock_holds_nothing_through_a_constant(is_locked):
+    model = coupled(Constant(value=0.6))
+    model["/jointset/j/q"].locked = is_locked
+    beta = model["/jointset/k/beta"]
+    beta.locked, beta.default_value = True, 0.6
+    mjcf = to_mjcf(model)
+    assert None not in {leader for leader, _ in equalities(Compiled(mjcf)).values()}
+    assert mjcf.fidelity.translated["/constraintset/c"].startswith("nothing: ")
+
+
 def test_a_body_stays_on_its_ellipsoid():
     model = Model(name="shoulder")
     body = model.add(Body(name="scapula", mass=1.0, inertia=INERTIA, mass_center=(0.0, 0.0, 0.1)))
