@@ -216,7 +216,8 @@ class Trajectory(Tabular):
         """Columns (n,) of values, speeds, states, forces and probes, in SI units and radians.
 
         Names are ``<coordinate>`` and ``<coordinate>/speed``, and those of `auxiliary`, `forces`
-        and `probes`.
+        and `probes`. A force or probe with the name of another column, such as an actuator that is
+        called like its coordinate, is called ``<name>/force`` or ``<name>/probe``.
 
         Returns:
             Columns by name.
@@ -225,7 +226,11 @@ class Trajectory(Tabular):
         for index, name in enumerate(self.coordinates):
             columns[name] = self.values[:, index]
             columns[f"{name}/speed"] = self.speeds[:, index]
-        return {**columns, **self.auxiliary, **self.forces, **self.probes}
+        columns |= self.auxiliary
+        for ending, group in (("force", self.forces), ("probe", self.probes)):
+            for name, column in group.items():
+                columns[f"{name}/{ending}" if name in columns else name] = column
+        return columns
 
     @property
     def table(self) -> tuple[Mapping[str, Array], Mapping[str, Array]]:

@@ -33,7 +33,7 @@ from osimlite.schema.contact_forces import ExponentialContactForce
 from osimlite.simulation import Interrupted, Simulation, read_sto
 from osimlite.simulation.engines.batch import BatchWorkspace
 from osimlite.simulation.options import compute_report_times
-from tests.simple_models import make_single_body
+from tests.simple_models import make_single_body, make_slide
 
 
 @pytest.fixture
@@ -445,6 +445,13 @@ def test_files(walker, tmp_path):
         summary["settings"]["accuracy"] == 1e-3
         and summary["versions"]["osimlite"] == osimlite.__version__
     )
+
+
+def test_an_actuator_with_the_name_of_its_coordinate_has_a_column():
+    model = make_slide(osimlite.CoordinateActuator(name="x", coordinate="x", optimal_force=3.0))
+    columns = osimlite.simulate(model, to=0.02, controls={"x": 0.5}).columns
+    assert columns["x"][0] == 0.0 and columns["x"][-1] > 0.0
+    np.testing.assert_array_equal(columns["x/force"], 1.5)
 
 
 def test_states_alone(walker, tmp_path):
