@@ -28,6 +28,7 @@ from osimlite import (
 )
 from osimlite.errors import OsimliteError, SettingError, SimulationError
 from osimlite.translate.mjcf.driven import COMPUTED_NOTE
+from tests.simple_models import make_single_body
 from tests.translate.mjcf.support import assert_refused, chain, coupled, on_a_function
 
 SPLINE = SimmSpline(x=(-1.0, 0.0, 0.5, 1.2, 2.0), y=(0.1, 0.3, 0.2, 0.25, 0.4))
@@ -224,6 +225,18 @@ def test_a_prescribed_coordinate_follows_time_and_its_controller_the_control():
     q, u, _ = driver.state()
     np.testing.assert_allclose(q, trajectory.values[-1], rtol=0.0, atol=1e-8)
     assert u[1] == pytest.approx(1.5 * np.cos(1.2), rel=1e-9) and not driver.mjcf.fidelity.records
+
+
+def test_a_model_whose_coordinates_are_all_prescribed_follows_time():
+    coordinate = osimlite.Coordinate(
+        name="q", prescribed=True, prescribed_function=Sine(amplitude=0.5, omega=3.0)
+    )
+    model = make_single_body(osimlite.PinJoint(name="pin", coordinates=[coordinate]))
+    driver = osimlite.mjcf.Driver(model, timestep=1e-3)
+    driver.step(100)
+    (q,), (u,), _ = driver.state()
+    assert q == pytest.approx(0.5 * np.sin(0.3), abs=1e-6)
+    assert u == pytest.approx(1.5 * np.cos(0.3), abs=1e-5)
 
 
 def test_callbacks_of_others_come_back_and_are_called():

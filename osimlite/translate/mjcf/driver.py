@@ -323,10 +323,9 @@ class Driver:
         other_rows = np.setdiff1d(np.arange(data.ne), equality_rows)
         jacobian = data.efc_J.reshape(-1, self.model.nv)[other_rows]
         applied = data.qfrc_passive - data.qfrc_bias + data.qfrc_applied
-        inertia = (
-            np.array([self._multiply_mass(data, column) for column in free_to_all.T.copy()])
-            @ free_to_all
-        )
+        # Also without free joints the product has as many columns as there are joints.
+        columns = [self._multiply_mass(data, column) for column in free_to_all.T.copy()]
+        inertia = np.array(columns).reshape(-1, self.model.nv) @ free_to_all
         right_side = np.append(
             free_to_all.T @ (applied - self._multiply_mass(data, prescribed)),
             data.efc_aref[other_rows] - jacobian @ prescribed,
