@@ -227,6 +227,49 @@ def test_a_prescribed_coordinate_follows_time_and_its_controller_the_control():
     assert u[1] == pytest.approx(1.5 * np.cos(1.2), rel=1e-9) and not driver.mjcf.fidelity.records
 
 
+def test_a_coordinate_may_be_prescribed_and_coupled():
+    model = chain()
+    dependent = next(item for item in model.components(Coordinate) if item.name == "q4")
+    dependent.prescribed = True
+    dependent.prescribed_function = Sine(amplitude=0.5, omega=3.0, offset=0.3)
+    model.add(
+        CoordinateCouplerConstraint(
+            name="c",
+            coupled_coordinates_function=LinearFunction(coefficients=(2.0, 0.1)),
+            independent_coordinate_names=("q1",),
+            dependent_coordinate_name="q4",
+        )
+    )
+    (equality,) = (
+        record.detail for record in osimlite.to_mjcf(model).fidelity if record.kind == "prescribed"
+    )
+    assert equality == "equality q1"
+    driver = osimlite.mjcf.Driver(model, timestep=1e-3)
+    driver.step(100)
+    q, _, _ = driver.state()
+    assert q[4] == pytest.approx(0.3 + 0.5 * np.sin(0.3), abs=1e-6)
+    assert q[1] == pytest.approx((q[4] - 0.1) / 2.0, abs=1e-6)
+
+
+def test_a_coordinate_prescribed_and_coupled_nonlinearly_is_told():
+    model = chain()
+    dependent = next(item for item in model.components(Coordinate) if item.name == "q4")
+    dependent.prescribed, dependent.prescribed_function = True, osimlite.Constant(value=0.3)
+    coupler = CoordinateCouplerConstraint(
+        name="c",
+        coupled_coordinates_function=SPLINE.copy_deep(),
+        independent_coordinate_names=("q1",),
+        dependent_coordinate_name="q4",
+    )
+    model.add(coupler)
+    (record,) = (
+        record
+        for record in osimlite.to_mjcf(model, driver=True).fidelity
+        if record.kind == "prescribed"
+    )
+    assert record.component == dependent.path and record.how == "dropped"
+
+
 def test_a_model_whose_coordinates_are_all_prescribed_follows_time():
     coordinate = osimlite.Coordinate(
         name="q", prescribed=True, prescribed_function=Sine(amplitude=0.5, omega=3.0)

@@ -6,10 +6,11 @@ import math
 
 import numpy as np
 
-from osimlite.mechanics.multibody.functions import Linear
+from osimlite.mechanics.multibody.functions import Linear, SmoothFunction
 from osimlite.schema.joints import Joint
-from osimlite.simulation.robot.couplings import Composition
-from osimlite.translate.mjcf.draft import Follower, MjcfDraft
+from osimlite.simulation.robot.couplings import Composition, StraightLine
+from osimlite.translate.fidelity import LEFT_OUT
+from osimlite.translate.mjcf.draft import Follower, Lead, MjcfDraft
 
 
 def add_coordinates(draft: MjcfDraft) -> None:
@@ -49,25 +50,7 @@ def add_coordinates(draft: MjcfDraft) -> None:
                 "left out",
             )
         if coordinate.prescribed is not None and not coordinate.locked and leader is not None:
-            start = coordinate.prescribed.evaluate(np.zeros(1))[0]
-            # The driver evaluates the function of time at every step.
-            joint_function = (
-                Composition(Linear(*leader.line), coordinate.prescribed)
-                if draft.options.driver
-                else None
-            )
-            draft.add_follower(
-                leader.joint,
-                Follower(None, (leader.line.slope * start + leader.line.offset,), joint_function),
-            )
-            if joint_function is None:
-                note(
-                    "prescribed",
-                    coordinate.path,
-                    "a coordinate that follows a function of time",
-                    "held at its value at time 0; write the function into eq_data at every step",
-                    f"equality {leader.joint}",
-                )
+            _prescribe(draft, coordinate.path, coordinate.prescribed, leader)
     for joint in draft.tree.components:
         if isinstance(joint, Joint) and not joint.speeds_are_rates:
             note(
@@ -87,3 +70,53 @@ def add_coordinates(draft: MjcfDraft) -> None:
                 "free to move relative to ground, as in OpenSim; the speeds of its three hinges are the rates of the "
                 "angles, and not the components of the angular velocity",
             )
+
+
+def _prescribe(draft: MjcfDraft, path: str, function: SmoothFunction, lead: Lead) -> None:
+    """Let the joint of a prescribed coordinate follow time, or the joint that it follows itself.
+
+    Args:
+        draft: MJCF under construction.
+        path: absolute path of the coordinate.
+        function: prescribed value (rad or m) as a function of time (s).
+        lead: joint of the coordinate.
+    """
+    joint, line = lead
+    is_driven = draft.options.driver
+    follower = draft.followers.get(joint)
+    if follower is not None:
+        dependence = _find_line(draft, follower)
+        if follower.leader is None or (dependence and follower.leader in draft.followers):
+            # Something else moves the joint already, by the same values if the model is consistent.
+            return
+        if dependence is not None:
+            # A joint has one equality: the inverse function moves the joint that leads this one.
+            joint, line = follower.leader, dependence.inverse().compose(line)
+        elif is_driven:
+            draft.fidelity.add(
+                "prescribed",
+                path,
+                "a prescribed coordinate that a coupler also makes a nonlinear function of another one",
+                f"{LEFT_OUT}: only the coupler moves it",
+            )
+            return
+    start = function.evaluate(np.zeros(1))[0]
+    # The driver evaluates the function of time at every step.
+    joint_function = Composition(Linear(*line), function) if is_driven else None
+    draft.add_follower(joint, Follower(None, (line.slope * start + line.offset,), joint_function))
+    if joint_function is None:
+        draft.fidelity.add(
+            "prescribed",
+            path,
+            "a coordinate that follows a function of time",
+            "held at its value at time 0; write the function into eq_data at every step",
+            f"equality {joint}",
+        )
+
+
+def _find_line(draft: MjcfDraft, follower: Follower) -> StraightLine | None:
+    """Return the dependence of a joint on a joint of the model if it is linear and not constant."""
+    if follower.function is not None or follower.leader in (None, *draft.helpers):
+        return None
+    offset, slope, *higher = (*follower.polynomial, 0.0, 0.0)
+    return StraightLine(slope, offset) if slope and not any(higher) else None
