@@ -119,6 +119,30 @@ def test_couplers_prescribed_and_clamped_coordinates(
     )
 
 
+@pytest.mark.parametrize("code", [MACHINE_CODE, PYTHON_CODE], ids=["compiled", "Python"])
+def test_a_direction_that_only_the_constraint_curves(code: Code) -> None:
+    """A coordinate that does not count moves far, because it hardly moves the one that counts.
+
+    Along x = 0.1 y² + 1e-4 y + 0.2, the cost (x - 0.201)² / 2 has the curvature 1e-8 at y = 0 without
+    that of the constraint, which is 20,000 times as large.
+    """
+    model = osimlite.Model(name="two")
+    for number in range(2):
+        body = model.add(
+            osimlite.Body(name=f"b{number}", mass=1.0, inertia=(0.1, 0.1, 0.1, 0.0, 0.0, 0.0))
+        )
+        model.add(osimlite.PinJoint(name=f"j{number}").between(model.ground, body))
+    mechanism = build_mechanism(model)
+    infos = (mechanism.coordinates[0], replace(mechanism.coordinates[1], yielding=True))
+    coupler = Coupler(0, (1,), f.Polynomial((0.1, 1e-4, 0.2)))
+    mechanism = replace(mechanism, coordinates=infos, constraints=(coupler,))
+    wanted = np.array(((0.201, 0.0),))
+    compare(mechanism, wanted, code, accuracy=1e-7)
+    y = (-1e-4 + np.sqrt(1e-8 + 4e-4)) / 0.2
+    result = assemble_motion(mechanism, np.full(1, 0.7), wanted, code)
+    assert result[0] == pytest.approx((0.201, y), abs=1e-7)
+
+
 def test_loops(fixtures) -> None:
     """Start far from the constraints, where their curvature matters."""
     model = osimlite.Model(name="loop")

@@ -68,6 +68,8 @@ DIFFERENCE_STEP = 1e-6
 """Length of the finite differences of the equations (m or rad)."""
 MIN_CURVATURE = 1e-7
 """Curvature of the cost below which a direction counts as undetermined."""
+MIN_SLOPE = 1e-12
+"""Slope of the cost (m or rad) below which a direction without curvature counts as level."""
 SAFE_PIVOT = 1e-6
 """Least pivot of Cholesky's method above which no curvature is below `MIN_CURVATURE`."""
 
@@ -205,8 +207,8 @@ def find_nearest(a: Assembly, target: Floats, q: Floats) -> bool:
             return True
         length = find_step(a, target, q, has_curvature)
         # Curvature costs 2 evaluations per free direction, so it is used only where convergence is
-        # slow.
-        if not has_curvature and length > FAST_CONVERGENCE * previous_length:
+        # slow, or where the cost alone determines no step.
+        if not has_curvature and (not length < inf or length > FAST_CONVERGENCE * previous_length):
             has_curvature = True
             length = find_step(a, target, q, has_curvature)
         furthest = 1.0
@@ -344,7 +346,8 @@ def find_step(a: Assembly, target: Floats, q: Floats, has_curvature: bool) -> fl
         has_curvature: whether the Hessian contains the equations times their multipliers, besides the cost.
 
     Returns:
-        The largest change of a coordinate (rad or m).
+        The largest change of a coordinate (rad or m). Infinity if the cost has a slope but no
+        curvature in a direction, so that only the curvature of the equations can determine the step.
     """
     size = a.model[MODEL.DOFS]
     count = count_equations(a)
@@ -392,7 +395,9 @@ def find_step(a: Assembly, target: Floats, q: Floats, has_curvature: bool) -> fl
     if is_convex:
         solve_cholesky(dimension, spare, lengths)
     else:
-        step_downhill(dimension, curvature, spare, at(spare, size * size), lengths)
+        slope = step_downhill(dimension, curvature, spare, at(spare, size * size), lengths)
+        if not has_curvature and slope > MIN_SLOPE:
+            return inf
     for k in range(size):
         step[k] = 0.0
     largest = 0.0
@@ -472,7 +477,7 @@ def add_curvature(
             curvature[dimension * m + k] += 0.5 * total
 
 
-def step_downhill(count: int, curvature: Floats, vectors: Floats, work: Floats, x: Floats) -> None:
+def step_downhill(count: int, curvature: Floats, vectors: Floats, work: Floats, x: Floats) -> float:
     """Solve for a step where the Hessian is indefinite: downhill for negative, zero for no curvature.
 
     Args:
@@ -481,7 +486,11 @@ def step_downhill(count: int, curvature: Floats, vectors: Floats, work: Floats, 
         vectors: workspace (count, count).
         work: workspace (count,).
         x: negative gradient, then the step.
+
+    Returns:
+        The largest slope in a direction of no curvature.
     """
+    steepest = 0.0
     diagonalize(count, curvature, vectors)
     for k in range(count):
         total = 0.0
@@ -490,7 +499,10 @@ def step_downhill(count: int, curvature: Floats, vectors: Floats, work: Floats, 
             total += vectors[count * k + j] * x[j]
         # The absolute value turns a direction of negative curvature downhill.
         work[k] = 0.0 if value < MIN_CURVATURE else total / value
+        if value < MIN_CURVATURE:
+            steepest = max(steepest, abs(total))
     for j in range(count):
         x[j] = 0.0
         for k in range(count):
             x[j] += vectors[count * k + j] * work[k]
+    return steepest
