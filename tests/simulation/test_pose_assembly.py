@@ -17,6 +17,7 @@ from osimlite.mechanics.multibody import Mechanism, build_mechanism
 from osimlite.mechanics.multibody import functions as f
 from osimlite.mechanics.multibody.assembly import tolerance_of
 from osimlite.mechanics.multibody.constraints import Coupler, PrescribedCoordinate
+from osimlite.mechanics.multibody.linear import solve_with_null_space
 from osimlite.simulation.engines.linking import MACHINE_CODE, PYTHON_CODE, Code
 from osimlite.simulation.pose_assembly import assemble_motion
 from osimlite.simulation.recorded_motion import RecordedMotion
@@ -32,9 +33,21 @@ def change_of(mechanism: Mechanism, poses: np.ndarray, wanted: np.ndarray) -> np
 
 
 def compare(
-    mechanism: Mechanism, wanted: np.ndarray, code: Code = MACHINE_CODE, accuracy: float = 1e-9
+    mechanism: Mechanism,
+    wanted: np.ndarray,
+    code: Code = MACHINE_CODE,
+    accuracy: float = 1e-9,
+    uncertain: tuple[int, ...] = (),
 ) -> None:
-    """Compare assembled poses with those of the search in Python, at a time of 0.7 s."""
+    """Compare assembled poses with those of the search in Python, at a time of 0.7 s.
+
+    Args:
+        mechanism: the mechanism.
+        wanted: poses to start from (p, n).
+        code: code of the kernels.
+        accuracy: largest difference of a coordinate (m or rad).
+        uncertain: indices of coordinates that may differ by more.
+    """
     known = np.array([mechanism.assemble(q, 0.7) for q in wanted])
     result = assemble_motion(mechanism, np.full(len(wanted), 0.7), wanted, code)
     for q in result:
@@ -44,7 +57,8 @@ def compare(
     least, change = change_of(mechanism, known, wanted), change_of(mechanism, result, wanted)
     # An error of `accuracy` along the constraints changes the squared distance to first order.
     assert (np.abs(change - least) <= 1e-12 + 2.0 * np.sqrt(least) * accuracy).all()
-    assert np.abs(result - known).max() < accuracy
+    certain = np.delete(result - known, uncertain, axis=1)
+    assert np.abs(certain).max(initial=0.0) < accuracy
 
 
 @settings(max_examples=choose(8, 80))
@@ -85,7 +99,11 @@ def test_any_mechanism(case: Case, kind: str, seed: int, what: str, off: float) 
         with pytest.raises(SimulationError):
             assemble_motion(mechanism, np.full(len(wanted), 0.7), wanted, MACHINE_CODE)
         return
-    compare(mechanism, wanted, accuracy=1e-7)
+    # A coordinate that does not count is as uncertain as those that it moves, over its effect.
+    tangents = np.delete(solve_with_null_space(rows, np.zeros(len(rows)))[1], place, axis=0)
+    effects = np.linalg.svd(tangents, compute_uv=False)
+    is_uncertain = what == "yielding" and effects.min(initial=1.0) < 1e-2
+    compare(mechanism, wanted, accuracy=1e-7, uncertain=(place,) if is_uncertain else ())
 
 
 def build_tree() -> Mechanism:
