@@ -267,7 +267,8 @@ class Tree:
         """
         spec = get_field_specs(type(owner))[name]
         use = Use(owner, owner, spec, value)
-        result = self.resolve(use).target
+        resolution = self.resolve(use)
+        result = resolution.target
         if result is None:
             text = use.text
             if not text:
@@ -275,9 +276,15 @@ class Tree:
                     f"{type(owner).__name__} '{self.path_of(owner) or owner.name}': {name} is missing or empty; "
                     "'osimlite validate' lists every such place"
                 )
+            advice = suggest_name(text, self.list_spellings(use))
+            if resolution.failure == "illegal":
+                advice = (
+                    "; a path must not contain white space, '\\', '*' or '+': rename the component, "
+                    "and change the paths that name it"
+                )
             raise ModelError(
                 f"{type(owner).__name__} '{self.path_of(owner) or owner.name}': {name} names '{text}', "
-                f"but the model has no such {use.reference.target}{suggest_name(text, self.list_spellings(use))}"
+                f"but the model has no such {use.reference.target}{advice}"
             )
         return result
 

@@ -223,3 +223,16 @@ def test_every_object_of_the_file_is_found_by_its_class(walker: Model) -> None:
     assert all(type(item) is cls for cls, items in by_class.items() for item in items)
     assert {id(item) for item in walker.walk() if item.source_index is not None} <= set(result)
     assert [id(item) for item in walker.components(Body)] == [id(item) for item in by_class[Body]]
+
+
+def test_a_path_with_a_blank_is_refused_with_advice() -> None:
+    model = Model(name="blank")
+    model.add(Body(name="left leg"))
+    joint = PinJoint(
+        name="j", socket_parent_frame="/ground", socket_child_frame="/bodyset/left leg"
+    )
+    model.joint_set.objects.append(joint)
+    with pytest.raises(
+        ModelError, match=r"'/bodyset/left leg', .*white space.*: rename the component"
+    ):
+        model.tree().target(joint, "socket_child_frame", joint.socket_child_frame)
