@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import json
+import math
 import re
 import xml.etree.ElementTree as ElementTree
 
@@ -24,6 +25,7 @@ from osimlite.schema.geometry_types import Brick, Cone, Cylinder, Ellipsoid, Sph
 from osimlite.schema.joint_types import BallJoint, FreeJoint
 from osimlite.schema.markers import Marker
 from osimlite.translate import to_urdf
+from tests.simple_models import make_single_body
 from tests.simulation.robot.readers import in_bullet, mujoco_poses, worst_body, yourdfpy_poses
 from tests.translate.evaluator import Reader
 from tests.translate.support import kinds, one_body, unaccounted, vertices, visuals
@@ -69,6 +71,32 @@ def test_numbers_and_names_are_in_the_details():
     assert (
         details["coordinate-range", "/jointset/RightShankToThigh/RKnee_rz"] == "-1.74533 to 0 rad"
     )
+
+
+@pytest.mark.parametrize(
+    ("limits", "kind", "written"),
+    [
+        ((-math.inf, math.inf), "continuous", None),
+        ((math.nan, 1.0), "continuous", None),
+        ((-math.inf, 1.0), "revolute", ("-1000000000", "1")),
+        ((1.0, -1.0), "revolute", ("-1", "1")),
+        ((0.5, 0.5), "revolute", ("0.5", "0.5")),
+    ],
+)
+def test_limits_in_a_file_are_finite(limits, kind, written):
+    model = make_single_body(
+        osimlite.PinJoint(name="pin", coordinates=[Coordinate(name="q", range=limits)])
+    )
+    urdf = to_urdf(model, limits="range")
+    (joint,) = ElementTree.fromstring(urdf.text).findall("joint[@name='q']")
+    assert joint.get("type") == kind
+    limit = joint.find("limit")
+    if written is None:
+        assert limit.get("lower") is None
+    else:
+        assert (limit.get("lower"), limit.get("upper")) == written
+    (record,) = (record for record in urdf.fidelity if record.kind == "coordinate-range")
+    assert record.done == ("no limit written" if written is None else "written as a hard limit")
 
 
 def test_a_coupler_of_a_locked_coordinate_is_told():

@@ -364,7 +364,8 @@ def _substitute(outer: f.SmoothFunction, driver: CouplingDriver) -> CouplingDriv
 def limit_to_ranges(robot: Robot) -> Robot:
     """Return a robot whose joints are limited to the ranges of their coordinates.
 
-    Only joints whose value is linear in one coordinate are limited.
+    Only joints whose value is linear in one coordinate are limited, and only if the range is not
+    infinite on both sides.
 
     Args:
         robot: the robot.
@@ -378,6 +379,9 @@ def limit_to_ranges(robot: Robot) -> Robot:
             line.slope * end + line.offset
             for end in robot.mechanism.coordinates[joint.coordinates[0]].range
         )
-        return replace(joint, limits=(min(low, high), max(low, high)))
+        limits = min(low, high), max(low, high)
+        # Comparisons with NaN are false.
+        is_limited = limits[0] <= limits[1] and limits != (-np.inf, np.inf)
+        return replace(joint, limits=limits) if is_limited else joint
 
     return replace(robot, joints=tuple(limit_joint(joint) for joint in robot.joints))

@@ -188,7 +188,11 @@ def _write_joint(out: _XmlWriter, joint: RobotJoint, mimic: Mimic | None) -> Non
             out.empty("limit", effort_and_velocity)
         else:
             lower, upper = (-UNLIMITED, UNLIMITED) if joint.limits is None else joint.limits
-            position_limits = {"lower": number(lower), "upper": number(upper)}
+            # Not all readers know infinity, which a range may have on one side.
+            position_limits = {
+                "lower": number(max(lower, -UNLIMITED)),
+                "upper": number(min(upper, UNLIMITED)),
+            }
             out.empty("limit", {**position_limits, **effort_and_velocity})
         if mimic is not None:
             offset = {"offset": number(mimic.line.offset)} if mimic.line.offset else {}
