@@ -84,8 +84,14 @@ def test_the_derivatives_of_opensim_are_those_of_our_recursion(opensim_derivativ
     assert np.abs(other - expected).max() > 0.01
 
 
-def test_an_inertia_that_bullet_refuses_takes_no_other_route():
-    mechanism = knee(opensim_derivatives=False, inertia=np.diag((0.2, 0.01, 0.04)))
+@pytest.mark.parametrize(
+    "moments",
+    [(0.2, 0.01, 0.04), (-0.02, 0.01, 0.04), (-0.003, -0.002, 0.001), (-0.001, -0.002, -0.003)],
+)
+def test_an_inertia_that_bullet_refuses_takes_no_other_route(
+    moments: tuple[float, float, float], capfd: pytest.CaptureFixture[str]
+):
+    mechanism = knee(opensim_derivatives=False, inertia=np.diag(moments))
     q, u = np.array((0.4, -0.3, 0.2, 0.5)), np.array((2.0, -1.0, 1.5, 0.7))
     with BulletEngine(mechanism, Forces(())) as engine:
         assert engine.world.impossible
@@ -93,6 +99,8 @@ def test_an_inertia_that_bullet_refuses_takes_no_other_route():
         assert engine.compute_accelerations(0.0, q, u) == pytest.approx(
             mechanism.acceleration(q, u).tolist(), rel=1e-10
         )
+    # Bullet prints a warning where it replaces an inertia by zero.
+    assert capfd.readouterr() == ("", "")
 
 
 def test_routes_that_are_none_are_refused():

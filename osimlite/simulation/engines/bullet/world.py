@@ -280,13 +280,18 @@ def compute_inertia_excess(link: RobotLink) -> float:
         link: the link.
 
     Returns:
-        The largest principal moment (kg·m²); 0 if the inertia is valid.
+        Moment that makes all principal moments valid (kg·m²); 0 if they are.
     """
     moments = [float(moment) for moment in principal_axes(link.inertia)[0]]
     low, middle, high = sorted(moments)
+    if low < 0.0:
+        # Valid are moments above 0 of which the largest is at most the sum of the others, that is
+        # high + excess <= low + middle + 2 excess. Twice the least such number leaves room for
+        # Bullet's rounding.
+        return 2.0 * sum(map(abs, moments))
     # With `high` added to all three, the largest is at most the sum of the others: 2 high <= low +
     # middle + 2 high.
-    return high if high > low + middle or low < 0.0 else 0.0
+    return high if high > low + middle else 0.0
 
 
 def require_masses(robot: Robot) -> None:
