@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from itertools import pairwise
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import opensim
 
 import osimlite
 from osimlite.mechanics.multibody.constraints import Lock
+from osimlite.schema.wrapping import WrapObject
 from tests.oracle.opensim_runs import put
 
 JUMP = 1e-11
@@ -23,10 +25,11 @@ def compare_paths(file: Path, poses: int, seed: int = 0) -> None:
     default pose.
 
     Paths whose length is discontinuous at a pose, here or in OpenSim, are skipped, because rounding
-    decides the result there. Where a path amplifies rounding, the tolerance is the change of length
-    between poses that are hardly apart. Where OpenSim's length is NaN, osimlite must have no length
-    either. Where points of two bodies coincide, OpenSim's moment arms are NaN, and osimlite's must
-    be numbers.
+    decides the result there. For the same reason, paths are skipped whose lengths differ and jump
+    when the wrap objects move by 1e-15 m. Where a path amplifies rounding, the tolerance is the
+    change of length between poses that are hardly apart. Where OpenSim's length is NaN, osimlite
+    must have no length either. Where points of two bodies coincide, OpenSim's moment arms are NaN,
+    and osimlite's must be numbers.
     """
     opensim.Logger.setLevelString("off")
     theirs = opensim.Model(str(file))
@@ -69,7 +72,11 @@ def compare_paths(file: Path, poses: int, seed: int = 0) -> None:
                 if _jumps(theirs_nearby, length):
                     continue
                 spread = np.max(np.abs([ours - lengths[name], theirs_nearby - length]))
-                assert abs(lengths[name] - length) < 1e-12 + spread, name
+                if abs(lengths[name] - length) >= 1e-12 + spread:
+                    # Poses do not shake a segment whose ends do not move relative to the surface.
+                    moved = _lengths_beside_moved_surfaces(file, name, q)
+                    assert any(map(_jumps, moved, (lengths[name], length))), name
+                    continue
             assert abs(speeds[name] - path.getLengtheningSpeed(state)) < 1e-10, name
             expected = [path.computeMomentArm(state, coordinate) for coordinate in coordinates]
             result = [arms[name].get(info.path, 0.0) for info in infos]
@@ -91,6 +98,27 @@ def _lengths(path, theirs, coordinates, state, poses, u) -> np.ndarray:
         theirs.realizePosition(state)
         result.append(path.getLength(state))
     return np.array(result)
+
+
+def _lengths_beside_moved_surfaces(file: Path, name: str, q: np.ndarray) -> np.ndarray:
+    """Return the lengths (m) of a path, by osimlite and by OpenSim, after moves of all wrap objects by up to 1e-15 m."""
+    result = []
+    for shift in [size * row for size in (1e-16, 1e-15) for row in (*np.eye(3), *-np.eye(3))]:
+        model = osimlite.read(file)
+        for surface in model.components(WrapObject):
+            surface.translation = tuple((np.array(surface.translation) + shift).tolist())
+        with TemporaryDirectory() as folder:
+            osimlite.write(model, Path(folder) / "moved.osim")
+            theirs = opensim.Model(str(Path(folder) / "moved.osim"))
+        state, paths = theirs.initSystem(), osimlite.paths(model)
+        infos = paths.mechanism.coordinates
+        coordinates = [
+            opensim.Coordinate.safeDownCast(theirs.getComponent(info.path)) for info in infos
+        ]
+        put(coordinates, state, q, np.zeros(len(infos)))
+        theirs.realizePosition(state)
+        result.append([paths.lengths(q)[name], _path(theirs, model, name).getLength(state)])
+    return np.array(result).T
 
 
 def _coincide(path, state) -> bool:

@@ -323,6 +323,38 @@ def test_an_end_beside_the_middle_of_a_cylinder(quadrant, heights, tmp_path):
     compare_paths(tmp_path / "model.osim", poses=1)
 
 
+@pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-9, 2.0**-24, 1e-7, 1e-4])
+def test_a_segment_that_meets_the_axis_of_a_cylinder(angle, tmp_path):
+    """Rounding changes the length by about 5e-18 m divided by the angle (rad).
+
+    No pose moves the ends of the segment relative to the cylinder: the second one is on the axis of
+    joint j1.
+    """
+    model, body = Model(name="through"), None
+    for number in range(2):
+        below, body = (
+            body or model.ground,
+            model.add(Body(name=f"b{number}", mass=1.0, inertia=(1, 1, 1, 0, 0, 0))),
+        )
+        coordinate = Coordinate(name=f"q{number}", range=(-1.2, 1.2))
+        joint = osimlite.PinJoint(name=f"j{number}", coordinates=[coordinate])
+        tilt = 0.2 - 0.1 * number
+        model.add(joint.between(below, body, at=(0, 0.1, 0), turned=(tilt, 0, 0)))
+        if number == 0:
+            cylinder = WrapCylinder(name="cylinder", radius=0.03125, length=0.2)
+            cylinder.translation, cylinder.xyz_body_rotation = (0, 0.0625, 0), (0, angle, 0)
+            body.wrap_object_set.objects.append(cylinder)
+    spring = PathSpring(name="spring", resting_length=0.2, stiffness=300.0, dissipation=0.4)
+    points = (at(GROUND, 0, 0, 0), at(B0, 0, 0, 0), at(B1, 0, 0, 0.0625), at(B1, 0, 0, 0))
+    for index, point in enumerate(points):
+        point.name = f"p{index}"
+        spring.geometry_path.path_point_set.objects.append(point)
+    spring.geometry_path.path_wrap_set.objects.append(PathWrap(name="wrap", wrap_object="cylinder"))
+    model.add(spring)
+    osimlite.write(model, tmp_path / "model.osim")
+    compare_paths(tmp_path / "model.osim", poses=1)
+
+
 @settings(max_examples=choose(20, 40))
 @given(wrapped())
 def test_around_surfaces(tmp_path_factory, model):
