@@ -6,7 +6,7 @@ import os
 import socket
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import closing
+from contextlib import chdir, closing
 from pathlib import Path
 
 import pytest
@@ -58,7 +58,9 @@ def special(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Path]:
             place.symlink_to("pipe")
         case "socket":
             with closing(socket.socket(socket.AF_UNIX)) as made:
-                made.bind(str(place))
+                # The path of a socket has at most about 100 bytes, and that of the folder may be longer.
+                with chdir(tmp_path):
+                    made.bind(place.name)
                 yield place
                 return
     yield place
