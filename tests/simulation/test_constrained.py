@@ -96,7 +96,7 @@ def test_an_inertia_that_bullet_refuses_takes_no_other_route(
     with BulletEngine(mechanism, Forces(())) as engine:
         assert engine.world.impossible
         assert engine.route == "mass-matrix"
-        assert engine.compute_accelerations(0.0, q, u) == pytest.approx(
+        assert engine.compute_accelerations(0.0, q.tolist(), u.tolist()) == pytest.approx(
             mechanism.acceleration(q, u).tolist(), rel=1e-10
         )
     # Bullet prints a warning where it replaces an inertia by zero.

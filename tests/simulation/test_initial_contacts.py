@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import osimlite
@@ -16,7 +17,7 @@ from tests.simple_models import make_single_body
 
 def find(model: osimlite.Model) -> list[DeepContact]:
     mechanism = osimlite.mechanism(model)
-    q = [coordinate.default_value for coordinate in mechanism.coordinates]
+    q = np.array([coordinate.default_value for coordinate in mechanism.coordinates])
     return find_deep_contacts(force_elements(model, mechanism), mechanism, q, 0.0)
 
 
