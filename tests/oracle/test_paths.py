@@ -323,6 +323,32 @@ def test_an_end_beside_the_middle_of_a_cylinder(quadrant, heights, tmp_path):
     compare_paths(tmp_path / "model.osim", poses=1)
 
 
+def test_a_tangent_point_that_needs_several_trials(tmp_path):
+    """The search for the second tangent point increases its damping eleven times in a round.
+
+    All trials of a round share one gradient, which is that of the start of the round.
+    """
+    model = Model(name="far")
+    ellipsoid = WrapEllipsoid(
+        name="ellipsoid", quadrant="z", dimensions=(0.0558890378, 0.0726557492, 0.0447112303)
+    )
+    model.ground.wrap_object_set.objects.append(ellipsoid)
+    spring = PathSpring(name="spring", resting_length=0.2, stiffness=300.0, dissipation=0.4)
+    for name, place in (
+        ("p0", (0.1024790594, -0.0226375105, 0.0251555183)),
+        ("p1", (0.000257626985, -0.0277947825, -0.0526092285)),
+    ):
+        point = at(GROUND, *place)
+        point.name = name
+        spring.geometry_path.path_point_set.objects.append(point)
+    wrap = PathWrap(name="wrap", wrap_object="ellipsoid", method="axial")
+    spring.geometry_path.path_wrap_set.objects.append(wrap)
+    model.add(spring)
+    osimlite.write(model, tmp_path / "model.osim")
+    compare_paths(tmp_path / "model.osim", poses=1)
+    assert osimlite.paths(model).lengths([])["/forceset/spring"] > 0.25
+
+
 @pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-9, 2.0**-24, 1e-7, 1e-4])
 def test_a_segment_that_meets_the_axis_of_a_cylinder(angle, tmp_path):
     """Rounding changes the length by about 5e-18 m divided by the angle (rad).

@@ -295,6 +295,8 @@ def tangent_point(
             break
         n = times(2.0, multiply_elementwise(weights, r))
         downhill = minus(times(-e0, normal), add_scaled(times(e1 + 2.0 * e2, n), e3, by_end))
+        # The gradient is that of the start of the round, however many trials follow.
+        d_downhill = -e2 - e3
         cosine = dot(unit(minus(end, r)), unit(end))
         # OpenSim takes small steps where the end is seen under a large angle.
         size = (1.0 - cosine**100 if cosine > 0.1 else 1.0) / STEP_DIVISOR
@@ -302,7 +304,7 @@ def tangent_point(
         for _ in range(MAX_TRIALS):
             if not error >= previous_error:
                 break
-            step, d_step = solve_damped_step(normal, n, by_end, downhill, -e2 - e3, damping)
+            step, d_step = solve_damped_step(normal, n, by_end, downhill, d_downhill, damping)
             step = times(size, step)
             d_step = size * d_step
             r = plus(r, step)
