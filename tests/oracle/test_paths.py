@@ -250,44 +250,53 @@ def wrapped(draw):
     return model
 
 
+def add_spring(model, points, wrap_object=None, name="spring", **properties):
+    """Add a spring along points, which are named p0, p1 and so on, and around one wrap object.
+
+    The further properties are those of the PathWrap.
+    """
+    spring = PathSpring(name=name, resting_length=0.2, stiffness=300.0, dissipation=0.4)
+    for index, point in enumerate(points):
+        named_point = point.model_copy(update={"name": f"p{index}"})
+        spring.geometry_path.path_point_set.objects.append(named_point)
+    if wrap_object:
+        wrap = PathWrap(name="wrap", wrap_object=wrap_object, **properties)
+        spring.geometry_path.path_wrap_set.objects.append(wrap)
+    model.add(spring)
+
+
+def make_two_pins(name, tilts):
+    """Return a model of two bodies, b0 and b1, on pins whose axes are tilted by these angles (rad)."""
+    model = Model(name=name)
+    below = model.ground
+    for number, tilt in enumerate(tilts):
+        body = model.add(Body(name=f"b{number}", mass=1.0, inertia=(1, 1, 1, 0, 0, 0)))
+        coordinate = Coordinate(name=f"q{number}", range=(-1.2, 1.2))
+        joint = osimlite.PinJoint(name=f"j{number}", coordinates=[coordinate])
+        model.add(joint.between(below, body, at=(0, 0.1, 0), turned=(tilt, 0, 0)))
+        below = body
+    return model
+
+
 @pytest.mark.parametrize("quadrant", ["all", "-x"])
 def test_two_points_at_one_place_beside_a_torus(quadrant, tmp_path):
     model = Model(name="nowhere")
     torus = WrapTorus(name="torus", quadrant=quadrant, inner_radius=0.02, outer_radius=0.06)
-    spring = PathSpring(name="spring", resting_length=0.2, stiffness=300.0, dissipation=0.4)
-    for name in ("p0", "p1"):
-        point = at(GROUND, 0.0, -0.1, -0.02)
-        point.name = name
-        spring.geometry_path.path_point_set.objects.append(point)
     model.ground.wrap_object_set.objects.append(torus)
-    spring.geometry_path.path_wrap_set.objects.append(PathWrap(name="wrap", wrap_object="torus"))
-    model.add(spring)
+    add_spring(model, [at(GROUND, 0.0, -0.1, -0.02)] * 2, "torus")
     osimlite.write(model, tmp_path / "model.osim")
     compare_paths(tmp_path / "model.osim", poses=1)
 
 
 def test_points_of_two_bodies_at_one_place(tmp_path):
     """OpenSim's moment arms are NaN; here they are those of the path without one of the points."""
-    model, body = Model(name="centre"), None
-    for number in range(2):
-        below, body = (
-            body or model.ground,
-            model.add(Body(name=f"b{number}", mass=1.0, inertia=(1, 1, 1, 0, 0, 0))),
-        )
-        coordinate = Coordinate(name=f"q{number}", range=(-1.2, 1.2))
-        joint = osimlite.PinJoint(name=f"j{number}", coordinates=[coordinate])
-        model.add(joint.between(below, body, at=(0, 0.1, 0), turned=(0.2, 0, 0)))
+    model = make_two_pins("centre", (0.2, 0.2))
     first, last = at(GROUND, 0.3, 0.1, 0.0), at(B1, 0.2, -0.1, 0.0)
     # The joint's centre, where ground and b0 meet in every pose.
     on_ground, on_b0 = at(GROUND, 0.0, 0.1, 0.0), at(B0, 0.0, 0.0, 0.0)
     routes = {"both": (first, on_ground, on_b0, last), "one": (first, on_b0, last)}
     for name, points in routes.items():
-        spring = PathSpring(name=name, resting_length=0.2, stiffness=300.0, dissipation=0.4)
-        for index, point in enumerate(points):
-            spring.geometry_path.path_point_set.objects.append(
-                point.model_copy(update={"name": f"p{index}"})
-            )
-        model.add(spring)
+        add_spring(model, points, name=name)
     osimlite.write(model, tmp_path / "model.osim")
     compare_paths(tmp_path / "model.osim", poses=3)
     paths = osimlite.paths(model)
@@ -307,17 +316,8 @@ def test_an_end_beside_the_middle_of_a_cylinder(quadrant, heights, tmp_path):
     first, second = heights
     cylinder = WrapCylinder(name="cylinder", quadrant=quadrant, radius=0.03, length=0.2)
     for number, (x, y) in enumerate([(-0.09, 0.04), (-0.09, -0.01), (0.1, 0.025), (0.05, -0.04)]):
-        spring = PathSpring(
-            name=f"spring{number}", resting_length=0.2, stiffness=300.0, dissipation=0.4
-        )
-        for name, place in (("p0", (x, y, first)), ("p1", (0.1, 0.012, second))):
-            point = at(GROUND, *place)
-            point.name = name
-            spring.geometry_path.path_point_set.objects.append(point)
-        spring.geometry_path.path_wrap_set.objects.append(
-            PathWrap(name="wrap", wrap_object="cylinder")
-        )
-        model.add(spring)
+        points = (at(GROUND, x, y, first), at(GROUND, 0.1, 0.012, second))
+        add_spring(model, points, "cylinder", name=f"spring{number}")
     model.ground.wrap_object_set.objects.append(cylinder)
     osimlite.write(model, tmp_path / "model.osim")
     compare_paths(tmp_path / "model.osim", poses=1)
@@ -333,17 +333,11 @@ def test_a_tangent_point_that_needs_several_trials(tmp_path):
         name="ellipsoid", quadrant="z", dimensions=(0.0558890378, 0.0726557492, 0.0447112303)
     )
     model.ground.wrap_object_set.objects.append(ellipsoid)
-    spring = PathSpring(name="spring", resting_length=0.2, stiffness=300.0, dissipation=0.4)
-    for name, place in (
-        ("p0", (0.1024790594, -0.0226375105, 0.0251555183)),
-        ("p1", (0.000257626985, -0.0277947825, -0.0526092285)),
-    ):
-        point = at(GROUND, *place)
-        point.name = name
-        spring.geometry_path.path_point_set.objects.append(point)
-    wrap = PathWrap(name="wrap", wrap_object="ellipsoid", method="axial")
-    spring.geometry_path.path_wrap_set.objects.append(wrap)
-    model.add(spring)
+    points = (
+        at(GROUND, 0.1024790594, -0.0226375105, 0.0251555183),
+        at(GROUND, 0.000257626985, -0.0277947825, -0.0526092285),
+    )
+    add_spring(model, points, "ellipsoid", method="axial")
     osimlite.write(model, tmp_path / "model.osim")
     compare_paths(tmp_path / "model.osim", poses=1)
     assert osimlite.paths(model).lengths([])["/forceset/spring"] > 0.25
@@ -356,27 +350,12 @@ def test_a_segment_that_meets_the_axis_of_a_cylinder(angle, tmp_path):
     No pose moves the ends of the segment relative to the cylinder: the second one is on the axis of
     joint j1.
     """
-    model, body = Model(name="through"), None
-    for number in range(2):
-        below, body = (
-            body or model.ground,
-            model.add(Body(name=f"b{number}", mass=1.0, inertia=(1, 1, 1, 0, 0, 0))),
-        )
-        coordinate = Coordinate(name=f"q{number}", range=(-1.2, 1.2))
-        joint = osimlite.PinJoint(name=f"j{number}", coordinates=[coordinate])
-        tilt = 0.2 - 0.1 * number
-        model.add(joint.between(below, body, at=(0, 0.1, 0), turned=(tilt, 0, 0)))
-        if number == 0:
-            cylinder = WrapCylinder(name="cylinder", radius=0.03125, length=0.2)
-            cylinder.translation, cylinder.xyz_body_rotation = (0, 0.0625, 0), (0, angle, 0)
-            body.wrap_object_set.objects.append(cylinder)
-    spring = PathSpring(name="spring", resting_length=0.2, stiffness=300.0, dissipation=0.4)
+    model = make_two_pins("through", (0.2, 0.1))
+    cylinder = WrapCylinder(name="cylinder", radius=0.03125, length=0.2)
+    cylinder.translation, cylinder.xyz_body_rotation = (0, 0.0625, 0), (0, angle, 0)
+    model[B0].wrap_object_set.objects.append(cylinder)
     points = (at(GROUND, 0, 0, 0), at(B0, 0, 0, 0), at(B1, 0, 0, 0.0625), at(B1, 0, 0, 0))
-    for index, point in enumerate(points):
-        point.name = f"p{index}"
-        spring.geometry_path.path_point_set.objects.append(point)
-    spring.geometry_path.path_wrap_set.objects.append(PathWrap(name="wrap", wrap_object="cylinder"))
-    model.add(spring)
+    add_spring(model, points, "cylinder")
     osimlite.write(model, tmp_path / "model.osim")
     compare_paths(tmp_path / "model.osim", poses=1)
 

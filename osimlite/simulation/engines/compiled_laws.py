@@ -198,5 +198,9 @@ def _digest_translator() -> str:
 
 @cache
 def describe_machine() -> tuple[str, ...]:
-    """Return the operating system, the architecture and the features of the processor."""
+    """Describe the machine for which code is compiled.
+
+    Returns:
+        Operating system, architecture, and the features of the processor.
+    """
     return sys.platform, machine_name(), *sorted(processor_features())

@@ -222,7 +222,11 @@ class PythonCode(Code):
         return lambda number: kernel(*arrays, number)
 
     def make_callback(self, python: Callable[..., int], sizes: Sequence[int]) -> tuple[int, Any]:
-        """Return the number under which a function is registered, and nothing to keep alive."""
+        """Register a function.
+
+        Returns:
+            Its number, and None, since nothing must be kept alive.
+        """
         return pointers.register_law(python), None
 
 

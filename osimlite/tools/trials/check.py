@@ -68,7 +68,7 @@ class TrialReport(Report):
         return list(result.values())
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the report with values that JSON has; a value that does not exist is None.
+        """Return the report as a dictionary for JSON, in which missing measurements are None.
 
         Returns:
             Findings, verdicts and unchecked parts, by these names.

@@ -285,9 +285,9 @@ def compute_inertia_excess(link: RobotLink) -> float:
     moments = [float(moment) for moment in principal_axes(link.inertia)[0]]
     low, middle, high = sorted(moments)
     if low < 0.0:
-        # Valid are moments above 0 of which the largest is at most the sum of the others, that is
-        # high + excess <= low + middle + 2 excess. Twice the least such number leaves room for
-        # Bullet's rounding.
+        # Bullet accepts positive moments if the largest is at most the sum of the others: high +
+        # excess <= low + middle + 2 excess. Twice the least such number leaves room for Bullet's
+        # rounding.
         return 2.0 * sum(map(abs, moments))
     # With `high` added to all three, the largest is at most the sum of the others: 2 high <= low +
     # middle + 2 high.
